@@ -16,7 +16,6 @@ def progress(
     unit: str,
     total: int | None = None,
     initial: int = 0,
-    disable: bool = False,
 ) -> Any:
     """A tqdm bar, redrawn 5 times a second on a terminal and once in 15 seconds elsewhere."""
     interval = 0.2 if sys.stderr.isatty() else 15.0
@@ -26,7 +25,6 @@ def progress(
         unit=unit,
         total=total,
         initial=initial,
-        disable=disable,
         mininterval=interval,
         maxinterval=max(10.0, interval),
     )

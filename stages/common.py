@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable
+from io import FileIO
 from pathlib import Path
 from typing import Annotated
 
@@ -13,7 +14,7 @@ import typer
 from facefolds_core.errors import report_user_errors
 from facefolds_core.files.paths import check_subject_name, subject_folders, subject_of_dvc_stage
 from facefolds_core.pipeline.running import Work, alone, run_alone
-from facefolds_core.system.locks import Lock, try_lock
+from facefolds_core.system.locks import try_lock
 from facefolds_core.system.processes import end_with_parent
 
 Data = Annotated[Path, typer.Option(help="Folder that holds one folder a subject.")]
@@ -101,11 +102,11 @@ def wait_for_other_dvcs() -> None:
             typer.echo("waiting for another DVC that is at work in this folder, so that what was made is recorded")
             told = True
         time.sleep(LOOK)
-    lock.release()
+    lock.close()
 
 
-def _try_dvcs_lock(path: Path) -> Lock | None:
+def _try_dvcs_lock(path: Path) -> FileIO | None:
     try:
         return try_lock(path, create=False)
     except OSError:  # no such file, or one that is not ours to open: nobody to wait for
-        return Lock(os.open(os.devnull, os.O_RDONLY))
+        return FileIO(os.devnull)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from facefolds_core.asset import Manifest
+from facefolds_core.asset import Asset, Manifest, read_asset
 from facefolds_core.asset.cropping import CroppedLayer, crop_layers
 from facefolds_core.asset.inputs import check_inputs
 from facefolds_core.asset.manifest_file import MANIFEST_NAME, write_manifest
@@ -18,13 +19,18 @@ from facefolds_core.files.writing import atomic_folder
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.geometry.sphere_uv import Window, st_to_uv, uv_to_directions
+from facefolds_core.geometry.track import Track
 from facefolds_core.params import CompressParams, MeshCodec, VideoCodec
+from tests.geometry.test_track import SHIFTS, TURNS
 
 CENTRE = (-0.25, 0.0, 0.0)
 WINDOW: Window = (-0.5, 0.5, -0.4, 0.4)
 SOURCE = AssetSource(
     "caps", 30.0, Similarity(2.0, np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]]), np.array([0.1, 0.2, 0.3])), CENTRE
 )
+TRACK = Track.of(TURNS, SHIFTS)
+MOVING = replace(SOURCE, track=TRACK)
+"""A head that moves, for three frames."""
 
 PLAIN = CompressParams(
     mesh=MeshCodec(max_error_pixels=None, compression_level=0),
@@ -45,10 +51,14 @@ def cap_mesh(radius: float, vertices_a_side: int = 12, window: Window = WINDOW) 
     s, t = np.meshgrid(np.linspace(0, 1, n), np.linspace(0, 1, n))
     st = np.stack([s, t], -1).reshape(-1, 2)
     points = np.array(CENTRE) + radius * uv_to_directions(st_to_uv(st, window))
-    index = np.arange(n * n).reshape(n, n)
+    return TexturedMesh(points.astype(np.float32), grid_faces(n), st.astype(np.float32))
+
+
+def grid_faces(n: int) -> NDArray[np.int32]:
+    """(2 (n - 1)^2, 3) over n x n vertices, row by row."""
+    index = np.arange(n * n, dtype=np.int32).reshape(n, n)
     a, b, c, d = index[:-1, :-1], index[:-1, 1:], index[1:, :-1], index[1:, 1:]
-    faces = np.concatenate([np.stack([a, c, b], -1).reshape(-1, 3), np.stack([b, c, d], -1).reshape(-1, 3)])
-    return TexturedMesh(points.astype(np.float32), faces.astype(np.int32), st.astype(np.float32))
+    return np.concatenate([np.stack([a, c, b], -1).reshape(-1, 3), np.stack([b, c, d], -1).reshape(-1, 3)])
 
 
 def cap_texture(layer: int, frame: int, resolution: int) -> NDArray[np.uint8]:
@@ -81,16 +91,21 @@ def write_store(path: Path, frames: NDArray[np.uint8]) -> FrameStore:
     return FrameStore(path)
 
 
+@dataclass(frozen=True)
+class Store:
+    """Textures (K, N, R, R, 4)."""
+
+    frames: NDArray[np.uint8]
+
+    def image(self, layer: int, frame: int, /) -> NDArray[np.uint8]:
+        return np.asarray(self.frames[frame, layer])
+
+
 def cap_crops(layers: int, frames: int, resolution: int) -> tuple[CroppedLayer, ...]:
     """What the writer makes of the layers of `make_asset`."""
-    textures = [cap_textures(layers, frame, resolution) for frame in range(frames)]
-
-    class Store:
-        def image(self, layer: int, frame: int, /) -> NDArray[np.uint8]:
-            return np.asarray(textures[frame][layer])
-
+    textures = Store(np.stack([cap_textures(layers, frame, resolution) for frame in range(frames)]))
     meshes = [cap_mesh(radius_of(layer)) for layer in range(layers)]
-    return crop_layers(meshes, [WINDOW] * layers, Store(), frames)
+    return crop_layers(meshes, [WINDOW] * layers, textures, frames)
 
 
 def write_asset(
@@ -116,9 +131,10 @@ def make_asset(
     resolution: int = 64,
     params: CompressParams | None = None,
     source: AssetSource = SOURCE,
-) -> Manifest:
-    """Write the synthetic asset to `folder` (its textures' store goes beside it)."""
+) -> Asset:
+    """Write the synthetic asset to `folder` (its textures' store goes beside it), and read it."""
     textures = np.stack([cap_textures(layers, frame, resolution) for frame in range(frames)])
     store = write_store(folder.parent / f"{folder.name}-textures.arrow", textures)
     meshes = [cap_mesh(radius_of(layer)) for layer in range(layers)]
-    return write_asset(folder, meshes, [WINDOW] * layers, store, source, params or PLAIN)
+    write_asset(folder, meshes, [WINDOW] * layers, store, source, params or PLAIN)
+    return read_asset(folder)

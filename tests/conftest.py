@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
@@ -41,6 +42,20 @@ def captures_folder() -> Path:
     if not folder.is_dir():
         pytest.skip(f"no captures at {folder}; set FACEFOLDS_CAPTURES to their folder to run this test")
     return folder
+
+
+@pytest.fixture(scope="session")
+def rich(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """An asset with all that the format knows, not to be changed."""
+    from tests.viewer.fixtures import rich_asset  # here: most tests need none of it
+
+    return rich_asset(tmp_path_factory.mktemp("rich") / "asset")
+
+
+@pytest.fixture
+def rich_copy(rich: Path, tmp_path: Path) -> Path:
+    """The same, to spoil."""
+    return Path(shutil.copytree(rich, tmp_path / "asset"))
 
 
 @pytest.fixture(scope="session")

@@ -14,6 +14,8 @@ from facefolds_core.geometry.cameras import Camera
 from facefolds_core.rendering import AssetCaster, composite
 from facefolds_core.rendering.areas import AreaView
 from facefolds_core.rendering.raster import cast_layers
+from facefolds_core.rendering.reference import room_from
+from facefolds_core.rendering.reflection import reflected_colours
 from tests.scenes import look_at_origin
 
 GREY = "#7f7f7f"
@@ -59,6 +61,21 @@ def expected_means(
         for frame, textures in [(frame, asset.frame(frame)) for frame in frames]
         for name, view in views.items()
     }
+
+
+def lit_picture(
+    level: Asset | AssetLevel, camera: Camera, frame: int, room: NDArray[np.float64] | None = None
+) -> NDArray[np.float32]:
+    """(H, W, 3): one ray a pixel, over grey, with the reflection, the head where it stood in the light of its room.
+
+    Args:
+        room: rotation from the meshes' axes to those of the light, by default that of the head.
+    """
+    maps, seen_by = level.reflection(), level.camera_in_head(camera, frame)
+    assert maps is not None
+    hits, turned = AssetCaster(level).cast(seen_by), room_from(level, frame) if room is None else room
+    added = reflected_colours(hits, seen_by, level.windows, maps, turned)
+    return composite(hits, level.frame(frame), (GREY_VALUE,) * 3, added)[0]
 
 
 def means_of_frames(asset: Asset | AssetLevel, camera: Camera) -> list[NDArray[np.float32]]:

@@ -22,7 +22,7 @@ from facefolds_core.asset.streams import make_streams
 from facefolds_core.asset.video import FORMATS
 from facefolds_core.asset.writer import LevelContent, manifest_of
 from facefolds_core.files.writing import file_sha256
-from facefolds_core.packaging.rungs import stream_unit, write_rungs
+from facefolds_core.packaging.levels import stream_unit, write_rungs
 from facefolds_core.params import CompressParams, merged
 from tests.assets import PLAIN, SOURCE, WINDOW, cap_mesh, cap_textures, radius_of
 

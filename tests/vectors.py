@@ -34,11 +34,11 @@ from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.geometry.sphere_uv import Window, st_to_uv, uv_to_directions
 from facefolds_core.geometry.track import Track
-from facefolds_core.packaging.levels import Resampled
-from facefolds_core.packaging.rungs import write_rungs
+from facefolds_core.packaging.levels import Resampled, write_rungs
 from facefolds_core.params import CompressParams, LevelParams, MeshCodec, StreamParams, VideoCodec
 from facefolds_core.rendering.pixels import render
 from facefolds_core.rendering.reference import render_asset
+from tests.assets import grid_faces
 
 ASSETS = ("short", "stream")
 EXAMPLE = "short.glb"
@@ -79,10 +79,7 @@ def sheet(layer: int, side: int) -> TexturedMesh:
     u, v = st_to_uv(st, WINDOW).T
     bump = 0.13 * np.exp(-((u + 0.05) ** 2 + v**2) / 0.008) + 0.06 * np.exp(-((u - 0.2) ** 2) / 0.004)
     points = np.array(CENTRE) + (0.36 - 0.03 * layer + bump)[:, None] * uv_to_directions(st_to_uv(st, WINDOW))
-    index = np.arange(side * side).reshape(side, side)
-    a, b, c, d = index[:-1, :-1], index[:-1, 1:], index[1:, :-1], index[1:, 1:]
-    faces = np.concatenate([np.stack([a, c, b], -1).reshape(-1, 3), np.stack([b, c, d], -1).reshape(-1, 3)])
-    return TexturedMesh(points.astype(np.float32), faces.astype(np.int32), st.astype(np.float32))
+    return TexturedMesh(points.astype(np.float32), grid_faces(side), st.astype(np.float32))
 
 
 def source() -> AssetSource:

@@ -112,4 +112,4 @@ def load_asset(folder: str | Path, made_in: Path | None = None) -> Asset:
         UserError: if anything is missing, damaged or of another version; names the file.
     """
     found = reader.read_asset(folder)
-    return Asset(found.folder, found.manifest, found.levels, made_in)
+    return Asset(**vars(found), made_in=made_in)

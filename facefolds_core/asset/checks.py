@@ -20,6 +20,7 @@ from facefolds_core.asset.packing import MAX_PIXELS, MAX_SIDE, AtlasLayout, insi
 from facefolds_core.asset.segments import segment_problems
 from facefolds_core.asset.track_file import track_problems
 from facefolds_core.geometry.meshes import TexturedMesh
+from facefolds_core.geometry.sphere_uv import Window
 
 FARTHEST = 1e3
 """Units from the origin."""
@@ -218,15 +219,18 @@ def _level_problems(level: Level) -> list[str]:
         problems.append(f"{texture.frames} frames, more than its videos can hold")
     problems += layout_of(level).problems()
     for index, layer in enumerate(level.layers):
-        u0, u1, v0, v1 = layer.uv_window
-        if not (u0 < u1 and v0 < v1):
-            problems.append(f"uv_window {[u0, u1, v0, v1]} of layer {index} is empty")
+        problems += _window_problems(layer.uv_window, f"layer {index}")
         if max(layer.vertices, layer.triangles) > MOST_VERTICES:
             problems.append(f"{layer.vertices} vertices and {layer.triangles} triangles of layer {index}: too many")
     problems += _mesh_file_problems(level)
     if level.bytes != (total := sum(size for _, size, _ in level.files())):
         problems.append(f"bytes are {level.bytes}, those of its files are {total}")
     return problems + _reflection_problems(level)
+
+
+def _window_problems(window: Window, what: str) -> list[str]:
+    u0, u1, v0, v1 = window
+    return [] if u0 < u1 and v0 < v1 else [f"uv_window {list(window)} of {what} is empty"]
 
 
 def _mesh_file_problems(level: Level) -> list[str]:
@@ -245,10 +249,7 @@ def _reflection_problems(level: Level) -> list[str]:
     one = level.reflection
     if one is None:
         return []
-    problems = _size_problems(one.width, one.height)
-    u0, u1, v0, v1 = one.uv_window
-    if not (u0 < u1 and v0 < v1):
-        problems.append(f"uv_window {[u0, u1, v0, v1]} of the reflection is empty")
+    problems = _size_problems(one.width, one.height) + _window_problems(one.uv_window, "the reflection")
     problems += [
         f"{list(rect)} is not inside the reflection's picture"
         for rect in one.rects()

@@ -17,6 +17,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from facefolds_core.asset.opaque import faces_over
 from facefolds_core.asset.packing import Rect
 from facefolds_core.errors import UserError
 from facefolds_core.geometry.meshes import TexturedMesh
@@ -76,7 +77,7 @@ def crop_layers(
         alpha = textures.image(layer, 0)[..., 3]
         for frame in range(1, frames):
             alpha = np.maximum(alpha, textures.image(layer, frame)[..., 3])
-        shown = _shown_faces(mesh, alpha > ALPHA_BOUND)
+        shown = faces_over(mesh, alpha > ALPHA_BOUND)
         if shown.any():
             kept = shown | _covering(mesh, shown)
             cropped.append(_crop(layer, mesh, mesh.faces[kept], window, len(alpha), unit))
@@ -87,18 +88,6 @@ def crop_layers(
             remedy="train longer, or with another preset: the model shows nothing",
         )
     return tuple(cropped)
-
-
-def _shown_faces(mesh: TexturedMesh, holds: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """(F,) bool: faces within whose bounding box a bilinear look-up touches a texel of `holds` (R, R)."""
-    size = len(holds)
-    area = np.zeros((size + 1, size + 1), np.int64)
-    area[1:, 1:] = holds.cumsum(0).cumsum(1)
-    corners = mesh.st[mesh.faces].astype(np.float64) * size - 0.5
-    first = np.clip(np.floor(corners.min(1)), 0, size - 1).astype(np.intp)
-    last = np.clip(np.floor(corners.max(1)) + 2, 1, size).astype(np.intp)
-    (left, top), (right, bottom) = first.T, last.T
-    return np.asarray(area[bottom, right] - area[top, right] - area[bottom, left] + area[top, left] > 0)
 
 
 def _covering(mesh: TexturedMesh, shown: NDArray[np.bool_]) -> NDArray[np.bool_]:

@@ -72,10 +72,10 @@ class Builder:
             extra |= {"min": np.atleast_1d(values.min(0)).tolist(), "max": np.atleast_1d(values.max(0)).tolist()}
         return self.describe(kind, component, len(values), bufferView=view, **extra)
 
-    def array(self, kind: str, values: NDArray[Any], bounds: bool = False) -> int:
-        """Store floats (count, ...), a value a vertex; returns the index of their accessor."""
-        view = self.view(values.astype("<f4").tobytes(), ARRAY_BUFFER)
-        return self.accessor(kind, FLOAT, values, view, bounds)
+    def array(self, kind: str, values: NDArray[Any], bounds: bool = False, target: int | None = ARRAY_BUFFER) -> int:
+        """Store floats (count, ...), by default a value a vertex; returns the index of their accessor."""
+        stored = values.astype("<f4")
+        return self.accessor(kind, FLOAT, stored, self.view(stored.tobytes(), target), bounds)
 
     def indices(self, faces: NDArray[np.intp]) -> int:
         """Store triangles (F, 3); returns the index of their accessor."""
@@ -107,23 +107,41 @@ def write_glb(path: Path, level: AssetLevel, name: str, frame: int = 0) -> None:
     nodes: list[dict[str, Any]] = [{"name": "layers", "mesh": 0, "extras": {"layers": level.num_layers}}]
     if level.track is not None:
         nodes.append({"name": "head", "children": [0], **pose_of(level.track, frame)})
+    write_document(
+        path,
+        name,
+        builder,
+        nodes,
+        extensionsUsed=[UNLIT],
+        meshes=[{"name": "layers", "primitives": primitives}],
+        textures=[{"source": 0, "sampler": 0}],
+        images=[{"name": "layers", "mimeType": "image/png", "bufferView": picture}],
+    )
+
+
+def write_document(path: Path, name: str, builder: Builder, nodes: Sequence[dict[str, Any]], **parts: Any) -> int:
+    """Write a file with the arrays of `builder`; returns its bytes.
+
+    Args:
+        name: of the root node, the last one's parent.
+        parts: what else the document has.
+    """
     document = {
         "asset": {"version": "2.0", "generator": "facefolds"},
-        "extensionsUsed": [UNLIT],
         "scene": 0,
         "scenes": [{"nodes": [len(nodes)]}],
         "nodes": [*nodes, {"name": name, "rotation": TO_Y_UP, "children": [len(nodes) - 1]}],
-        "meshes": [{"name": "layers", "primitives": primitives}],
-        "materials": materials(),
-        "textures": [{"source": 0, "sampler": 0}],
-        "images": [{"name": "layers", "mimeType": "image/png", "bufferView": picture}],
+        "materials": _materials(),
         "samplers": [SAMPLER],
+        **parts,
         "accessors": builder.accessors,
         "bufferViews": builder.views,
         "buffers": [{"byteLength": len(builder.binary)}],
     }
+    data = container(document, bytes(builder.binary))
     with atomic_file(path) as temporary:
-        temporary.write_bytes(container(document, bytes(builder.binary)))
+        temporary.write_bytes(data)
+    return len(data)
 
 
 @dataclass(frozen=True)
@@ -200,7 +218,7 @@ def pose_of(track: Track, frame: int) -> dict[str, list[float]]:
     return {"rotation": [x, y, z, w], "translation": track.translations[frame].tolist()}
 
 
-def materials() -> list[dict[str, Any]]:
+def _materials() -> list[dict[str, Any]]:
     """Of core and shell: unlit, the first texture, without backs."""
     modes: dict[str, dict[str, Any]] = {
         "core": {"alphaMode": "MASK", "alphaCutoff": CUTOFF},

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from pydantic import Field, field_validator
+from pydantic import AfterValidator, Field
 
 from facefolds_core.asset.manifest_base import Count, Maybe, Offset, Part, Row, StoredFile, Vector
 
@@ -54,6 +54,23 @@ class Audio(StoredFile):
     mime: Maybe[str] = None
 
 
+def _rising(value: tuple[float, float]) -> tuple[float, float]:
+    if not value[0] <= value[1]:
+        raise ValueError("from the lower to the higher")
+    return value
+
+
+def _a_turn(value: tuple[float, float]) -> tuple[float, float]:
+    if value[1] > value[0] + 360:
+        raise ValueError("at most a full turn")
+    return value
+
+
+Longitude = Annotated[float, Field(ge=-360, le=360)]
+Latitude = Annotated[float, Field(ge=-90, le=90)]
+Distance = Annotated[float, Field(ge=0)]
+
+
 class Directions(Part):
     """A range of directions, seen from the origin.
 
@@ -62,22 +79,8 @@ class Directions(Part):
         elevation: degrees.
     """
 
-    azimuth: tuple[Annotated[float, Field(ge=-360, le=360)], Annotated[float, Field(ge=-360, le=360)]]
-    elevation: tuple[Annotated[float, Field(ge=-90, le=90)], Annotated[float, Field(ge=-90, le=90)]]
-
-    @field_validator("azimuth", "elevation")
-    @classmethod
-    def _in_order(cls, value: tuple[float, float]) -> tuple[float, float]:
-        if not value[0] <= value[1]:
-            raise ValueError("from the lower to the higher")
-        return value
-
-    @field_validator("azimuth")
-    @classmethod
-    def _a_turn(cls, value: tuple[float, float]) -> tuple[float, float]:
-        if value[1] > value[0] + 360:
-            raise ValueError("at most a full turn")
-        return value
+    azimuth: Annotated[tuple[Longitude, Longitude], AfterValidator(_rising), AfterValidator(_a_turn)]
+    elevation: Annotated[tuple[Latitude, Latitude], AfterValidator(_rising)]
 
 
 class FilmedView(Directions):
@@ -91,16 +94,9 @@ class FilmedView(Directions):
         good: where the picture is good, as far as the asset's own pictures tell; absent where that was not measured.
     """
 
-    distance: Maybe[tuple[Annotated[float, Field(ge=0)], Annotated[float, Field(ge=0)]]] = None
+    distance: Maybe[Annotated[tuple[Distance, Distance], AfterValidator(_rising)]] = None
     measured: Maybe[tuple[Vector, ...]] = None
     good: Maybe[Directions] = None
-
-    @field_validator("distance")
-    @classmethod
-    def _near_first(cls, value: tuple[float, float] | None) -> tuple[float, float] | None:
-        if value is not None and not value[0] <= value[1]:
-            raise ValueError("from the lower to the higher")
-        return value
 
 
 class Stream(Part):

@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 import re
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -69,22 +70,17 @@ def parse_manifest(path: Path) -> Manifest:
     Raises:
         UserError: if it is missing, not JSON, not a facefolds asset, of another version, or a key is wrong.
     """
+    wrong = partial(UserError, file=path, remedy=REMEDY)
     problem = special_problem(path)
     if problem is None and path.stat().st_size > LARGEST:
         problem = f"the file has {path.stat().st_size} bytes, a manifest at most {LARGEST}"
     if problem not in (None, MISSING):
-        raise UserError("the manifest cannot be read", file=path, found=problem, remedy=REMEDY)
+        raise wrong("the manifest cannot be read", found=problem)
     value = read_json(path, remedy=REMEDY)
     if not isinstance(value, dict) or value.get("format") != "facefolds":
         found = value.get("format") if isinstance(value, dict) else type(value).__name__
-        raise UserError(
-            "not the manifest of a facefolds asset",
-            file=path,
-            place="format",
-            expected="facefolds",
-            found=_shown(found),
-            remedy=REMEDY,
-        )
+        message = "not the manifest of a facefolds asset"
+        raise wrong(message, place="format", expected="facefolds", found=_shown(found))
     _check_version(path, value)
     return _validated(path, value)
 
@@ -121,6 +117,7 @@ def _check_version(path: Path, value: dict[str, Any]) -> None:
 
 
 def _validated(path: Path, value: dict[str, Any]) -> Manifest:
+    wrong = partial(UserError, file=path, remedy=REMEDY)
     newer = value["version"] != FORMAT_VERSION
     if newer:
         value = {**value, "version": FORMAT_VERSION, "minVersion": LEAST_VERSION}
@@ -135,19 +132,12 @@ def _validated(path: Path, value: dict[str, Any]) -> Manifest:
         missing = _missing_keys(manifest.model_dump(mode="json"), value)
     except ValidationError as error:
         first = error.errors()[0]
-        place = ".".join(str(part) for part in first["loc"])
-        raise UserError(
-            "the manifest is wrong",
-            file=path,
-            place=place,
-            expected=first["msg"],
-            found=repr(first["input"])[:200],
-            remedy=REMEDY,
-        ) from None
+        place, found = ".".join(str(part) for part in first["loc"]), repr(first["input"])[:200]
+        raise wrong("the manifest is wrong", place=place, expected=first["msg"], found=found) from None
     except (ValueError, RecursionError):  # pydantic: what lies too deep in extras
-        raise UserError("the manifest is wrong", file=path, found="too deep", remedy=REMEDY) from None
+        raise wrong("the manifest is wrong", found="too deep") from None
     if missing:
-        raise UserError("the manifest lacks keys", file=path, place=", ".join(missing), remedy=REMEDY)
+        raise wrong("the manifest lacks keys", place=", ".join(missing))
     return manifest
 
 

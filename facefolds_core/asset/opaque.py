@@ -41,13 +41,13 @@ def opaque_where_covered(textures: Sequence[NDArray[np.uint8]], windows: Sequenc
 
 
 def faces_over(mesh: TexturedMesh, mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Which triangles may show a texel of the mask (h, w): those with one in the rectangle around them. (F,)"""
+    """(F,) bool: faces within whose bounding box a bilinear look-up touches a texel of the mask (h, w)."""
     size = mask.shape[::-1]
-    sums = np.pad(mask.cumsum(0, dtype=np.int64).cumsum(1), ((1, 0), (1, 0)))
-    corners = mesh.st[mesh.faces] * size
-    x0, y0 = np.floor(corners.min(1) - 1).clip(0, size).astype(np.intp).T
-    x1, y1 = np.ceil(corners.max(1) + 1).clip(0, size).astype(np.intp).T
-    return np.asarray(sums[y1, x1] - sums[y0, x1] - sums[y1, x0] + sums[y0, x0] > 0)
+    area = np.pad(mask.cumsum(0, dtype=np.int64).cumsum(1), ((1, 0), (1, 0)))
+    corners = mesh.st[mesh.faces].astype(np.float64) * size - 0.5
+    left, top = np.clip(np.floor(corners.min(1)), 0, np.subtract(size, 1)).astype(np.intp).T
+    right, bottom = np.clip(np.floor(corners.max(1)) + 2, 1, size).astype(np.intp).T
+    return np.asarray(area[bottom, right] - area[top, right] - area[bottom, left] + area[top, left] > 0)
 
 
 def _alpha_at(texture: NDArray[np.uint8], st: NDArray[np.float64]) -> NDArray[np.float64]:

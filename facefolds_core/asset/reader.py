@@ -70,8 +70,6 @@ class AssetLevel:
         Raises:
             UserError: if its picture is damaged.
         """
-        if self.entry.reflection is not None:
-            refuse_changed(self.folder, self.entry.reflection)
         return read_reflection(self.folder, self.entry)
 
     @property
@@ -86,10 +84,9 @@ class AssetLevel:
             UserError: if the video is damaged or has another number of frames than the manifest says.
         """
         count = 0
-        for frame in self._decode(0):
-            if count < self.num_frames:
+        for count, frame in enumerate(self._decode(0), 1):
+            if count <= self.num_frames:
                 yield frame
-            count += 1
         if count != self.num_frames:
             raise self._wrong_count(count)
 
@@ -138,60 +135,21 @@ class AssetLevel:
         )
 
 
-@dataclass(frozen=True)
-class Asset:
-    """An asset whose files have been checked against the manifest. Its own layers and frames are the full level's.
+@dataclass(frozen=True, kw_only=True)
+class Asset(AssetLevel):
+    """An asset whose files have been checked against the manifest: its full level, and what else there is.
 
     Attributes:
-        folder: where it lies.
         manifest: its manifest.
         levels: coarsest first.
     """
 
-    folder: Path
     manifest: Manifest
     levels: tuple[AssetLevel, ...]
 
     @property
     def full(self) -> AssetLevel:
         return self.levels[-1]
-
-    @property
-    def layers(self) -> tuple[TexturedMesh, ...]:
-        return self.full.layers
-
-    @property
-    def num_layers(self) -> int:
-        return self.full.num_layers
-
-    @property
-    def num_frames(self) -> int:
-        return self.full.num_frames
-
-    @property
-    def track(self) -> Track | None:
-        return self.full.track
-
-    def camera_in_head(self, camera: Camera, time: float) -> Camera:
-        """As `AssetLevel.camera_in_head`."""
-        return self.full.camera_in_head(camera, time)
-
-    @property
-    def windows(self) -> list[Window]:
-        """As `AssetLevel.windows`."""
-        return self.full.windows
-
-    def reflection(self) -> ReflectionMaps | None:
-        """As `AssetLevel.reflection`."""
-        return self.full.reflection()
-
-    def frames(self) -> Iterator[Frame]:
-        """As `AssetLevel.frames`."""
-        return self.full.frames()
-
-    def frame(self, index: int) -> Frame:
-        """As `AssetLevel.frame`."""
-        return self.full.frame(index)
 
 
 def read_asset(folder: str | Path) -> Asset:
@@ -213,7 +171,8 @@ def read_asset(folder: str | Path) -> Asset:
         if problem:
             raise UserError("damaged asset", file=folder / name, found=problem, remedy=REMEDY)
     track = read_track(folder, manifest)
-    return Asset(folder, manifest, tuple(read_level(folder, level, track) for level in manifest.levels))
+    levels = tuple(read_level(folder, level, track) for level in manifest.levels)
+    return Asset(**vars(levels[-1]), manifest=manifest, levels=levels)
 
 
 def read_level(folder: Path, level: Level, track: Track | None = None) -> AssetLevel:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from io import BytesIO
-from itertools import pairwise
+from itertools import accumulate, pairwise
 from pathlib import Path
 
 from facefolds_core.asset.manifest import REMEDY, Texture, Video
@@ -15,10 +15,7 @@ from facefolds_core.errors import UserError
 
 def starts(video: Video) -> list[int]:
     """Numbers of the frames that the segments begin with, and that after the last."""
-    places = [0]
-    for segment in video.segments or ():
-        places.append(places[-1] + segment.frames)
-    return places
+    return list(accumulate((segment.frames for segment in video.segments or ()), initial=0))
 
 
 def segment_problems(video: Video, texture: Texture) -> list[str]:

@@ -10,6 +10,7 @@ import hashlib
 import re
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass
 from fractions import Fraction
 from heapq import merge
@@ -109,7 +110,7 @@ def _mux(folder: Path, tracks: Sequence[Track], texture: Texture) -> dict[int, l
         "fflags": "bitexact",
     }
     with av.open(str(folder / DASH), "w", format="dash", options=options) as out:
-        _copy_packets(out, tracks, texture.rate)
+        copy_packets(out, [track.source for track in tracks], texture.rate)
     names = {f"track_{track.index}.mp4": track.name for track in tracks}
     names |= {f"media_{track.index}.m3u8": track.playlist for track in tracks}
     for old, new in names.items():
@@ -120,28 +121,27 @@ def _mux(folder: Path, tracks: Sequence[Track], texture: Texture) -> dict[int, l
     return _ranges((folder / DASH).read_text())
 
 
-def _copy_packets(out: Any, tracks: Sequence[Track], rate: Fraction) -> None:
-    """All tracks' packets, by their times; those of pictures are numbered, whatever their container rounded."""
-    sources = [av.open(f"file:{track.source}", format=FORMATS[container_of(track.source)]) for track in tracks]
-    try:
-        streams = [source.streams[0] for source in sources]
-        copies = [out.add_stream_from_template(stream, opaque=True) for stream in streams]
+def copy_packets(out: Any, files: Sequence[Path], rate: Fraction) -> None:
+    """The packets of files with one track each, by their times; pictures are numbered, whatever a container rounded.
+
+    Args:
+        out: PyAV's container.
+        rate: pictures a second.
+    """
+    with ExitStack() as opened:
+        sources = [opened.enter_context(av.open(f"file:{one}", format=FORMATS[container_of(one)])) for one in files]
+        copies = [out.add_stream_from_template(source.streams[0], opaque=True) for source in sources]
         for copy in copies:
             if copy.type == "video":
                 copy.time_base = 1 / rate  # WebM's milliseconds would end segments a frame late
-        queues = [
-            _packets(source, stream, copy, rate) for source, stream, copy in zip(sources, streams, copies, strict=True)
-        ]
+        queues = [_packets(source, copy, rate) for source, copy in zip(sources, copies, strict=True)]
         for _, _, packet in merge(*queues, key=lambda entry: entry[:2]):
             out.mux(packet)
-    finally:
-        for source in sources:
-            source.close()
 
 
-def _packets(source: Any, stream: Any, copy: Any, rate: Fraction) -> Iterator[tuple[Fraction, int, Any]]:
-    for number, packet in enumerate(packet for packet in source.demux(stream) if packet.size):
-        if stream.type == "video":
+def _packets(source: Any, copy: Any, rate: Fraction) -> Iterator[tuple[Fraction, int, Any]]:
+    for number, packet in enumerate(packet for packet in source.demux(source.streams[0]) if packet.size):
+        if copy.type == "video":
             packet.time_base, packet.pts, packet.dts, packet.duration = 1 / rate, number, number, 1
         packet.stream = copy
         yield packet.dts * packet.time_base, copy.index, packet

@@ -172,11 +172,12 @@ def _opened(path: Path, part: BinaryIO | None = None) -> Iterator[tuple[Any, Any
     """
     try:
         kind = container_of(path) if part is None else kind_of(part, fragments=True)
-        options = {"err_detect": STRICT["err_detect"]}
+        if part is not None:
+            part.seek(0)
         with av.open(
-            f"file:{path}" if part is None else _rewound(part),
+            f"file:{path}" if part is None else part,
             format=FORMATS[kind],
-            container_options=options,
+            container_options={"err_detect": STRICT["err_detect"]},
             stream_options=cast(Any, [STRICT]),
         ) as container:
             if not container.streams.video:
@@ -189,11 +190,6 @@ def _opened(path: Path, part: BinaryIO | None = None) -> Iterator[tuple[Any, Any
         raise UserError("file not found", file=path, remedy="make the asset again, or copy it again") from None
     except (FFmpegError, ValueError) as error:  # PyAV: metadata that are no text, a file without streams
         raise _damaged(path, str(error)) from None
-
-
-def _rewound(part: BinaryIO) -> BinaryIO:
-    part.seek(0)
-    return part
 
 
 def _damaged(path: Path, found: str) -> UserError:

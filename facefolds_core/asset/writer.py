@@ -195,7 +195,9 @@ def write_level(
             shutil.copyfile(encoded[codec.name], path)
         else:
             content.encode(path, codec, params.video, crf, regions=regions)
-        videos.append(_video_entry(path, codec))
+        stored, facts = stored_file(path).model_dump(), probe_video(path)
+        video = Video(**stored, container=codec.container, codec=codec.name, mime=facts.mime, level=facts.level)
+        videos.append(video)
     texture = Texture(
         width=layout.width,
         height=layout.height,
@@ -203,7 +205,7 @@ def write_level(
         alpha_rect=layout.alpha_rect,
         frames=content.frames,
         frame_rate=content.rate.as_integer_ratio(),
-        keyframes=_shared_key_frames([folder / video.file for video in videos]),
+        keyframes=tuple(sorted(set.intersection(*(set(key_frames(folder / video.file)) for video in videos)))),
         videos=tuple(videos),
     )
     size = meshes.bytes + sum(video.bytes for video in videos)
@@ -232,19 +234,3 @@ def _write_layers(
     path.write_bytes(content)
     whole = StoredFile(file=path.name, bytes=len(content), sha256=hashlib.sha256(content).hexdigest())
     return whole, tuple(entries)
-
-
-def _shared_key_frames(videos: Sequence[Path]) -> tuple[int, ...]:
-    """Key frames of all the videos."""
-    return tuple(sorted(set.intersection(*(set(key_frames(path)) for path in videos))))
-
-
-def _video_entry(path: Path, codec: Codec) -> Video:
-    facts = probe_video(path)
-    return Video(
-        **stored_file(path).model_dump(),
-        container=codec.container,
-        codec=codec.name,
-        mime=facts.mime,
-        level=facts.level,
-    )

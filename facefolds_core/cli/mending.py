@@ -10,12 +10,10 @@ from __future__ import annotations
 import json
 import os
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 from facefolds_core.errors import UserError
-from facefolds_core.system.locks import WAIT, try_lock
+from facefolds_core.system.locks import holding
 
 PATIENCE = 5.0
 """Seconds to wait for a DVC that is at work."""
@@ -38,33 +36,13 @@ def mend(root: Path) -> list[str]:
     ):
         if not path.is_file() or is_whole(path):
             continue
-        with _while_dvc_waits(guard):
+        with holding(guard, PATIENCE) as free:  # one of DVC's own locks
+            if not free:
+                message = "DVC is at work in this folder, so its files were not looked at"
+                raise UserError(message, file=guard, remedy="let it end, and run the same command again")
             if path.is_file() and not is_whole(path):  # DVC may have written it meanwhile
                 lines.append(_move_away(path))
     return lines
-
-
-@contextmanager
-def _while_dvc_waits(guard: Path) -> Iterator[None]:
-    """Hold one of DVC's own locks.
-
-    Raises:
-        UserError: if a DVC holds it for longer than PATIENCE.
-    """
-    guard.parent.mkdir(parents=True, exist_ok=True)
-    deadline = time.monotonic() + PATIENCE
-    while (lock := try_lock(guard)) is None:
-        if time.monotonic() > deadline:
-            raise UserError(
-                "DVC is at work in this folder, so its files were not looked at",
-                file=guard,
-                remedy="let it end, and run the same command again",
-            )
-        time.sleep(WAIT)
-    try:
-        yield
-    finally:
-        lock.release()
 
 
 def is_lockfile(path: Path) -> bool:

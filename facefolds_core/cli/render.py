@@ -16,6 +16,7 @@ import typer
 from numpy.typing import NDArray
 from PIL import Image
 
+from facefolds_core.api.cameras import camera_named, cameras_of_asset
 from facefolds_core.asset import read_asset
 from facefolds_core.asset.codecs import CODECS
 from facefolds_core.asset.colour import rgb_to_yuv420
@@ -23,9 +24,8 @@ from facefolds_core.asset.filmed import direction_of, swing_filmed, unfilmed_wor
 from facefolds_core.asset.manifest_extras import FilmedView
 from facefolds_core.asset.reader import Asset, AssetLevel
 from facefolds_core.asset.video import encode_video
-from facefolds_core.cli.cameras import named_camera
 from facefolds_core.errors import UserError, report_user_errors
-from facefolds_core.files.writing import atomic_file
+from facefolds_core.files.writing import atomic_file, read_json
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.params import VideoCodec
 from facefolds_core.rendering.camera_paths import (
@@ -73,6 +73,10 @@ class Kind(StrEnum):
     FLY = "fly"
 
 
+def _refused(option: str, message: str, expected: str, found: object, remedy: str) -> UserError:
+    return UserError(message, place=f"--{option}", expected=expected, found=found, remedy=remedy)
+
+
 def parse_size(text: str, film: bool) -> tuple[int, int]:
     """Width and height from "1280x720".
 
@@ -83,9 +87,7 @@ def parse_size(text: str, film: bool) -> tuple[int, int]:
     size = (int(match[1]), int(match[2])) if match else (0, 0)
     if min(size) < 16 or (film and (size[0] % 2 or size[1] % 2)):
         expected = f"WIDTHxHEIGHT in pixels, at least 16{', even' if film else ''}"
-        raise UserError(
-            "no size for a picture", place="--size", expected=expected, found=text, remedy="such as 1280x720"
-        )
+        raise _refused("size", "no size for a picture", expected, text, "such as 1280x720")
     return size
 
 
@@ -99,13 +101,7 @@ def check_limits(**options: float) -> None:
         option = name.replace("_", "-")
         low, high = LIMITS[option]
         if not low <= value <= high:
-            raise UserError(
-                "a number out of bounds",
-                place=f"--{option}",
-                expected=f"{low:g} to {high:g}",
-                found=value,
-                remedy="choose one within",
-            )
+            raise _refused(option, "a number out of bounds", f"{low:g} to {high:g}", value, "choose one within")
 
 
 def parse_colour(text: str) -> tuple[float, float, float]:
@@ -115,7 +111,7 @@ def parse_colour(text: str) -> tuple[float, float, float]:
         UserError: if it is no colour.
     """
     if not re.fullmatch(r"#?[0-9a-fA-F]{6}", text):
-        raise UserError("no colour", place="--background", expected="#rrggbb", found=text, remedy="such as #16181d")
+        raise _refused("background", "no colour", "#rrggbb", text, "such as #16181d")
     red, green, blue = bytes.fromhex(text.removeprefix("#"))
     return red / 255, green / 255, blue / 255
 
@@ -131,10 +127,38 @@ def pick_level(asset: Asset, name: str | None) -> AssetLevel:
             return level
     if name is not None:
         names = ", ".join(level.entry.name for level in asset.levels)
-        raise UserError(
-            "no such level of detail", place="--level", expected=names, found=name, remedy="choose one of these"
-        )
+        raise _refused("level", "no such level of detail", names, name, "choose one of these")
     return asset.full
+
+
+def named_camera(asset: Asset, name: str) -> Camera:
+    """The camera of that name, in the world of the asset.
+
+    Raises:
+        UserError: if there is none, listing those that there are; or if the file holds none.
+    """
+    if name.endswith(".json"):
+        return _from_file(Path(name))
+    none = "FILE.json: this asset names no camera, and there is no scene beside it"
+    known = cameras_of_asset(asset, asset.folder.resolve().parent)
+    return camera_named(name, known, "--camera", none, ", or give a JSON file with K, w2c, width and height")
+
+
+def _from_file(path: Path) -> Camera:
+    remedy = "give one as an object with K by rows, w2c = (R | t) by rows, width, height"
+    value = read_json(path, remedy=remedy)
+    try:
+        K, w2c = np.array(value["K"], float), np.array(value["w2c"], float)
+        width, height = int(value["width"]), int(value["height"])
+        rotation = w2c[:, :3]
+        sound = K.shape == (3, 3) and w2c.shape == (3, 4) and np.isfinite(K).all() and np.isfinite(w2c).all()
+        sound = sound and min(width, height) >= 16 and max(width, height) <= 16_384 and K[0, 0] > 0 and K[1, 1] > 0
+        sound = sound and np.abs(rotation @ rotation.T - np.eye(3)).max() < 1e-2 and np.linalg.det(rotation) > 0
+    except (KeyError, TypeError, ValueError, IndexError):
+        sound = False
+    if not sound:
+        raise UserError("no camera in the file", file=path, expected="K, w2c, width and height", remedy=remedy)
+    return Camera(path.stem, K, w2c, width, height)
 
 
 def shrink(rgb: NDArray[np.float32], samples: int) -> NDArray[np.uint8]:
@@ -175,13 +199,6 @@ def film_path(view: FilmedView | None, kind: Kind, start: Eye, count: int, sweep
     if kind is Kind.FLY:
         return fly_through(start, count, sides, heights)
     return turntable(start, count, sides if sweep is None else (sweep, sweep))
-
-
-def warn_of_unfilmed(view: FilmedView | None, directions: Sequence[tuple[float, float]]) -> None:
-    """A line where pictures look from where no camera stood: azimuth and elevation, degrees."""
-    words = None if view is None else unfilmed_words(view, directions)
-    if words is not None:
-        typer.echo(f"render: warning: {words}", err=True)
 
 
 def command(
@@ -229,9 +246,7 @@ def command(
         colour = parse_colour(background)
         if samples * max(width, height) > LARGEST_SIDE:
             expected = f"at most {LARGEST_SIDE // samples} pixels a side with --samples {samples}"
-            raise UserError(
-                "too large a picture", place="--size", expected=expected, found=size, remedy="a smaller one"
-            )
+            raise _refused("size", "too large a picture", expected, size, "a smaller one")
         check_limits(azimuth=azimuth, elevation=elevation, field_of_view=field_of_view)
         check_limits(distance=1.0 if distance is None else distance)
         check_limits(seconds=seconds, sweep=sweep or 0.0, fps=1.0 if fps is None else fps)
@@ -241,10 +256,7 @@ def command(
         read = read_asset(asset)
         shown = pick_level(read, level)
         if not 0 <= frame < shown.num_frames:
-            expected = f"0 to {shown.num_frames - 1}"
-            raise UserError(
-                "no such frame", place="--frame", expected=expected, found=frame, remedy="choose one of these"
-            )
+            raise _refused("frame", "no such frame", f"0 to {shown.num_frames - 1}", frame, "choose one of these")
         given = None if camera is None else named_camera(read, camera)
         if given is not None:
             width, height = given.width, given.height
@@ -256,7 +268,8 @@ def command(
         if kind is not Kind.STILL:
             eyes = film_path(view, kind, start, max(2, round(seconds * rate)), sweep)
         seen = [direction_of(given)] if given is not None else [(eye.azimuth, eye.elevation) for eye in eyes]
-        warn_of_unfilmed(view, seen)
+        if view is not None and (words := unfilmed_words(view, seen)):
+            typer.echo(f"render: warning: {words}", err=True)
         turns = (
             [min(eyes, key=attrgetter("azimuth")), start, max(eyes, key=attrgetter("azimuth"))]
             if kind is Kind.TURNTABLE

@@ -53,7 +53,7 @@ def command(
         if sweep:
             _keep_sweep(out, outcomes, cells)
         else:
-            pull = remote or (scheduler is not None and _has_remote(root))
+            pull = remote or (scheduler is not None and "remote" in Config(str(root / ".dvc"))["core"])
             _record(root, outcomes, pull, everybody=set(names) == set(params.subjects))
         _print_table(outcomes)
         if any(outcome.error for outcome in outcomes):
@@ -88,10 +88,6 @@ def _run_all(
                 told = outcome.error.replace("\n", "\n  ")
                 typer.echo(f"  {told}\n  all of it in {log}; the same command runs only what failed again")
     return [found[job] for job in todo]
-
-
-def _has_remote(root: Path) -> bool:
-    return Config(str(root / ".dvc"))["core"].get("remote") is not None
 
 
 def _record(root: Path, outcomes: Sequence[Outcome], pull: bool, everybody: bool) -> None:

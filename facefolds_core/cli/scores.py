@@ -28,15 +28,26 @@ def lines_of(folders: SubjectFolders) -> list[str]:
         raise UserError("garbled scores", file=folders.metrics, found=repr(error), remedy=REMEDY) from None
 
 
-def command(
-    subjects: Annotated[
-        list[Path] | None, typer.Argument(help="Folders of subjects. Left out: all under --data that have scores.")
-    ] = None,
-    data: Annotated[Path, typer.Option(help="Folder that holds one folder a subject.")] = Path("data"),
-) -> None:
+Subjects = Annotated[
+    list[Path] | None, typer.Argument(help="Folders of subjects. Left out: all under --data that have scores.")
+]
+Data = Annotated[Path, typer.Option(help="Folder that holds one folder a subject.")]
+
+
+def evaluated_subjects(subjects: list[Path] | None, data: Path) -> list[SubjectFolders]:
+    """Those that are named, or all under `data` that have scores.
+
+    Raises:
+        UserError: if there is none.
+    """
+    found = subjects or sorted(path.parent for path in data.glob("*/metrics.json"))
+    if not found:
+        remedy = "run `make repro` first, or name a subject's folder"
+        raise UserError("no subject has been evaluated yet", file=data, remedy=remedy)
+    return [SubjectFolders(folder) for folder in found]
+
+
+def command(subjects: Subjects = None, data: Data = Path("data")) -> None:
     """Where each subject's asset is, what it weighs, how good it is, what is not well, and how to look at it."""
     with report_user_errors("scores"):
-        folders = subjects or sorted(path.parent for path in data.glob("*/metrics.json"))
-        if not folders:
-            raise UserError("no subject has been evaluated yet", file=data, remedy="run `make repro` first")
-        typer.echo("\n\n".join("\n".join(lines_of(SubjectFolders(folder))) for folder in folders))
+        typer.echo("\n\n".join("\n".join(lines_of(folders)) for folders in evaluated_subjects(subjects, data)))

@@ -17,8 +17,7 @@ import psutil
 from distributed import Client, Future, LocalCluster, SSHCluster, as_completed
 
 from facefolds_core.cluster.job import Job, Outcome, do, end_all
-from facefolds_core.cluster.project import snapshot
-from facefolds_core.cluster.run_cache import SETTLED, drop_empty_runs
+from facefolds_core.cluster.project import SETTLED, drop_empty_runs, snapshot
 from facefolds_core.errors import UserError
 
 QUEUES = ("slurm", "pbs", "sge", "lsf", "oar", "moab", "htcondor")

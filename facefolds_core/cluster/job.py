@@ -17,6 +17,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -107,10 +108,10 @@ def do(job: Job, run: str) -> Outcome:
             if found := RUNNING.match(line):
                 worker.log_event(run, {"job": job.name, "stage": found[1], "host": socket.gethostname()})
 
-        shell = _Shell(run, root, _environment(worker), tell)
-        status, log = repro(shell.dvc, ["repro", *(["--pull"] if pull else []), job.target])
+        dvc = partial(_dvc, run, root, _environment(worker), tell)
+        status, log = repro(dvc, ["repro", *(["--pull"] if pull else []), job.target])
         if pull:  # of a job that failed, too: what its first stages made
-            pushed, said = shell.dvc(["push", "--run-cache", "--with-deps", job.target])
+            pushed, said = dvc(["push", "--run-cache", "--with-deps", job.target])
             if pushed and not status:
                 status, log = pushed, log + said
         metrics = root / "data" / job.subject / "metrics.json"
@@ -145,45 +146,36 @@ def _environment(worker: Any) -> dict[str, str]:
     return environment
 
 
-@dataclass(frozen=True)
-class _Shell:
-    """Commands in a job's folder.
+def _dvc(
+    run: str, root: Path, environment: Mapping[str, str], tell: Callable[[str], None], *commands: Sequence[str]
+) -> tuple[int, str]:
+    """Exit status of the last of some DVC commands in a job's folder, and what they said.
 
-    Attributes:
+    Args:
         run: that they are part of, with which they are ended.
-        root: the job's folder.
-        environment: of the processes.
         tell: hears each line that DVC says, at once.
     """
-
-    run: str
-    root: Path
-    environment: Mapping[str, str]
-    tell: Callable[[str], None]
-
-    def dvc(self, *commands: Sequence[str]) -> tuple[int, str]:
-        """Exit status of the last of some DVC commands, and what they said."""
-        words = [word for command in commands for word in (THEN, *command)][1:]
-        lines = []
-        with subprocess.Popen(
-            [sys.executable, "-m", "facefolds_core.cluster.dvc", *words],
-            cwd=self.root,
-            env=dict(self.environment),
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            encoding="utf-8",
-            errors="replace",
-            start_new_session=True,  # so that its stages can be ended with it
-        ) as process:
-            _at_work.setdefault(self.run, []).append(process)
-            assert process.stdout is not None
-            for line in process.stdout:
-                lines.append(line)
-                self.tell(line)
-            status = process.wait()
-            _at_work[self.run].remove(process)
-        return status, "".join(lines)
+    words = [word for command in commands for word in (THEN, *command)][1:]
+    lines = []
+    with subprocess.Popen(
+        [sys.executable, "-m", "facefolds_core.cluster.dvc", *words],
+        cwd=root,
+        env=dict(environment),
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        encoding="utf-8",
+        errors="replace",
+        start_new_session=True,  # so that its stages can be ended with it
+    ) as process:
+        _at_work.setdefault(run, []).append(process)
+        assert process.stdout is not None
+        for line in process.stdout:
+            lines.append(line)
+            tell(line)
+        status = process.wait()
+        _at_work[run].remove(process)
+    return status, "".join(lines)
 
 
 def end_all(run: str) -> None:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
+import time
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -13,13 +15,14 @@ from distributed import WorkerPlugin
 from dvc.config import Config
 
 from facefolds_core.cluster.lockfile import LOCK
-from facefolds_core.cluster.run_cache import drop_empty_runs
 from facefolds_core.errors import UserError
 from facefolds_core.files.reading import is_regular
 
 CODE = ("facefolds_core", "stages")
 FILES = ("dvc.yaml", "params.yaml", ".dvcignore", ".dvc/config", ".dvc/config.local")
 LEFT_OUT = (".pyc", ".pyo")
+SETTLED = 1.0
+"""Seconds after which a folder that is still empty stays so: DVC makes it and writes its file at once."""
 
 
 @dataclass
@@ -148,3 +151,18 @@ def snapshot(root: Path, run: str, always: bool) -> Project:
         remote=remote,
         always=always,
     )
+
+
+def drop_empty_runs(cache: Path) -> None:
+    """Remove empty folders of the run cache, over which every later DVC stumbles: "join() argument must be str".
+
+    A DVC that is killed between making the folder of an entry and writing it leaves one (dvc/stage/cache.py, 3.x:
+    `_load` takes the newest file of a folder, and there is none).
+
+    Args:
+        cache: DVC's cache folder, which need not exist.
+    """
+    for folder in (cache / "runs").glob("??/*"):
+        with suppress(OSError):  # it holds entries, as all others do, or is gone
+            if time.time() - folder.stat().st_mtime > SETTLED:
+                folder.rmdir()

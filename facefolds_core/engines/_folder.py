@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from facefolds_core.asset.colour import luma_to_alpha, yuv420_to_rgb
 from facefolds_core.asset.manifest import Texture
+from facefolds_core.asset.reader import AssetLevel
 from facefolds_core.asset.video import Picture
 from facefolds_core.errors import UserError
 
@@ -22,6 +23,12 @@ def rgb_picture(picture: Picture, texture: Texture) -> NDArray[np.uint8]:
     x0, y0, w, h = texture.alpha_rect
     rgb[y0 : y0 + h, x0 : x0 + w] = luma_to_alpha(y[y0 : y0 + h, x0 : x0 + w])[..., None]
     return rgb
+
+
+def in_words(level: AssetLevel, place: Path) -> str:
+    """What was written to a file or folder."""
+    size = sum(path.stat().st_size for path in (place, *place.rglob("*")) if path.is_file())
+    return f"{level.num_layers} layers, {level.num_frames} frames, {size / 1e6:.1f} MB"
 
 
 def refuse_other_content(folder: Path, mark: str) -> None:

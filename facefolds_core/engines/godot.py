@@ -14,13 +14,11 @@ import shutil
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
 from PIL import Image
 
 from facefolds_core.asset.reader import AssetLevel
 from facefolds_core.asset.stored import refuse_changed
-from facefolds_core.engines._folder import refuse_other_content, rgb_picture
+from facefolds_core.engines._folder import in_words, refuse_other_content, rgb_picture
 from facefolds_core.files.writing import atomic_folder, write_json
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.geometry.reflections import window_to_window
@@ -33,37 +31,25 @@ QUALITY = 95
 """Of the pictures: lossy WebP, 0..100. Lossless ones would be several times larger."""
 
 
-def y_up(points: NDArray[np.float32]) -> NDArray[np.float32]:
-    """(..., 3) in the asset's axes -> Godot's: y up, the subject looks to +z, its left is +x. A rotation."""
-    return points[..., [1, 2, 0]]
-
-
 def export(out: Path, level: AssetLevel, subject: str) -> str:
-    """See `write_godot`."""
-    size = write_godot(out, level, subject)
-    return f"{level.num_layers} layers, {level.num_frames} frames, {size / 1e6:.1f} MB"
-
-
-def write_godot(folder: Path, level: AssetLevel, subject: str) -> int:
-    """Write a level for Godot into `folder`, which is replaced.
-
-    Returns:
-        bytes of all files.
+    """Write a level for Godot into a folder, which is replaced.
 
     Raises:
         UserError: if the folder holds anything else than an earlier export, or the asset's video is damaged.
     """
-    refuse_other_content(folder, CONTENTS)
+    refuse_other_content(out, CONTENTS)
     texture = level.entry.texture
-    with atomic_folder(folder) as out:
+    with atomic_folder(out) as folder:
         layers: list[dict[str, Any]] = []
         for index, (mesh, entry) in enumerate(zip(level.layers, level.entry.layers, strict=True)):
             name = f"layer_{index:02d}.mesh"
-            (out / name).write_bytes(mesh_bytes(mesh))
+            (folder / name).write_bytes(mesh_bytes(mesh))
             counts = {"vertices": len(mesh.vertices), "triangles": len(mesh.faces)}
             layers.append({"mesh": name, **counts, "texture_rect": list(entry.texture_rect)})
         for number, picture in enumerate(level.pictures()):
-            Image.fromarray(rgb_picture(picture, texture)).save(out / PICTURE.format(number), quality=QUALITY, method=4)
+            Image.fromarray(rgb_picture(picture, texture)).save(
+                folder / PICTURE.format(number), quality=QUALITY, method=4
+            )
         contents: dict[str, Any] = {
             "format": FORMAT,
             "version": VERSION,
@@ -80,7 +66,7 @@ def write_godot(folder: Path, level: AssetLevel, subject: str) -> int:
         one = level.entry.reflection
         if one is not None:
             refuse_changed(level.folder, one)
-            shutil.copyfile(level.folder / one.file, out / one.file)
+            shutil.copyfile(level.folder / one.file, folder / one.file)
             scales = [one.environment_scale, one.gloss_scale, one.offset_scale]
             contents["reflection"] = {**one.model_dump(mode="json", include=_OF_A_REFLECTION), "scales": scales}
             for layer, window in zip(layers, level.windows, strict=True):
@@ -88,11 +74,11 @@ def write_godot(folder: Path, level: AssetLevel, subject: str) -> int:
         if level.track is not None:
             poses = zip(level.track.quaternions.tolist(), level.track.translations.tolist(), strict=True)
             contents["track"] = [{"quaternion": q, "translation": t} for q, t in poses]
-        write_json(out / CONTENTS, contents)
-        return sum(path.stat().st_size for path in out.iterdir())
+        write_json(folder / CONTENTS, contents)
+        return in_words(level, folder)
 
 
 def mesh_bytes(mesh: TexturedMesh) -> bytes:
-    """A layer as the add-on reads it."""
-    vertices = y_up(mesh.vertices).astype("<f4").tobytes()
+    """A layer as the add-on reads it, in Godot's axes: y up, the subject looks to +z, its left is +x."""
+    vertices = mesh.vertices[:, [1, 2, 0]].astype("<f4").tobytes()
     return vertices + mesh.st.astype("<f4").tobytes() + mesh.faces.astype("<u4").tobytes()

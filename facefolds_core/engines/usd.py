@@ -25,7 +25,7 @@ from PIL import Image
 from facefolds_core.asset.glb import back_to_front
 from facefolds_core.asset.manifest import Texture
 from facefolds_core.asset.reader import AssetLevel
-from facefolds_core.engines._folder import refuse_other_content, rgb_picture
+from facefolds_core.engines._folder import in_words, refuse_other_content, rgb_picture
 from facefolds_core.errors import UserError
 from facefolds_core.files.writing import atomic_file, atomic_folder
 from facefolds_core.geometry.meshes import TexturedMesh
@@ -37,16 +37,7 @@ QUALITY = 95
 
 
 def export(out: Path, level: AssetLevel, subject: str) -> str:
-    """See `write_usd`."""
-    size = write_usd(out, level, subject)
-    return f"{level.num_layers} layers, {level.num_frames} frames, {size / 1e6:.1f} MB"
-
-
-def write_usd(out: Path, level: AssetLevel, subject: str) -> int:
     """Write a level into a folder (`face.usdc`, `textures/`), which is replaced, or into a package, `*.usdz`.
-
-    Returns:
-        bytes of all files.
 
     Raises:
         UserError: if usd-core is not installed, the folder holds anything else than an earlier export, or the asset's
@@ -57,11 +48,11 @@ def write_usd(out: Path, level: AssetLevel, subject: str) -> int:
         with atomic_file(out) as temporary, tempfile.TemporaryDirectory(dir=temporary.parent) as parts:
             write_files(pxr, Path(parts), level, subject)
             pack(pxr, Path(parts), temporary)
-        return out.stat().st_size
+        return in_words(level, out)
     refuse_other_content(out, STAGE)
     with atomic_folder(out) as place:
         write_files(pxr, place, level, subject)
-        return sum(path.stat().st_size for path in place.rglob("*") if path.is_file())
+        return in_words(level, place)
 
 
 def write_files(pxr: Any, folder: Path, level: AssetLevel, subject: str) -> None:

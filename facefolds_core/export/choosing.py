@@ -78,24 +78,41 @@ def looks_of(scene: Scene) -> tuple[Split, list[Look]]:
     return split, looks
 
 
-def _photo(
-    scene: Scene, look: Look, hits: Hits, pixels: NDArray[np.intp], images: Sequence[Texture], grids: Grids
-) -> Any:
-    """(M, 3): the photo at pixels without what the reflection adds there, which textures do not show.
+@dataclass(frozen=True)
+class Seen:
+    """What a look shows through some meshes, at pixels drawn at random.
 
-    Args:
-        hits: of the look's camera.
-        images: textures of its frame.
+    Attributes:
+        pixels: (M,).
+        hits: at the pixels.
+        images: textures of the look's frame, as they were sampled.
+        photo: (M, 3) at the pixels, without what the reflection adds there, which textures do not show.
     """
-    photo = look.photo.reshape(-1, 3)[pixels]
-    if grids.reflection is None:
-        return photo
-    to_room = None if scene.poses is None else scene.poses.at(look.frame).rotation
-    windows = [grids.window(i) for i in range(grids.num_layers)]
-    added = reflected_colours(hits, look.camera, windows, grids.reflection, to_room)
-    shine = composite(hits, images, added=added)[0] - composite(hits, images)[0]
-    matte: NDArray[np.float64] = photo - shine.reshape(-1, 3)[pixels]
-    return matte
+
+    look: Look
+    pixels: NDArray[np.intp]
+    hits: Hits
+    images: Sequence[Texture]
+    photo: NDArray[np.float64]
+
+
+def _seen(
+    scene: Scene, looks: Sequence[Look], meshes: Sequence[TexturedMesh], grids: Grids, textures: FrameStore
+) -> list[Seen]:
+    rng, layers = np.random.default_rng(0), sorted({layer for layer, _ in textures})
+    images = {k: [textures.image(layer, k) for layer in layers] for k in {look.frame for look in looks}}
+    windows, found = [grids.window(i) for i in range(grids.num_layers)], []
+    for look in looks:
+        hits, own = cast_layers(look.camera, meshes), images[look.frame]
+        pixels = hits.choose(rng, RAYS)
+        photo = look.photo.reshape(-1, 3)[pixels]
+        if grids.reflection is not None:
+            to_room = None if scene.poses is None else scene.poses.at(look.frame).rotation
+            added = reflected_colours(hits, look.camera, windows, grids.reflection, to_room)
+            shine = composite(hits, own, added=added)[0] - composite(hits, own)[0]
+            photo = photo - shine.reshape(-1, 3)[pixels]
+        found.append(Seen(look, pixels, hits.at(pixels), own, photo))
+    return found
 
 
 Picture = tuple[NDArray[np.float32], NDArray[np.float32]]
@@ -159,21 +176,12 @@ def choose_meshes(
         grids, textures: as they were sampled.
     """
     split, looks = looks_of(scene)
-    rng, finest = np.random.default_rng(0), ladder[max(MESHES)]
-    images = {look.frame: _images(textures, look.frame) for look in looks}
-    pixels, photos = list[NDArray[np.intp]](), list[NDArray[np.float64]]()
-    for look in looks:
-        hits = cast_layers(look.camera, finest)
-        pixels.append(hits.choose(rng, RAYS))
-        photos.append(_photo(scene, look, hits, pixels[-1], images[look.frame], grids))
+    seen = _seen(scene, looks, ladder[max(MESHES)], grids, textures)
 
     def pictures(candidate: int) -> list[Picture]:
-        return [
-            composite(cast_layers(look.camera, ladder[candidate]).at(at), images[look.frame])
-            for look, at in zip(looks, pixels, strict=True)
-        ]
+        return [composite(cast_layers(s.look.camera, ladder[candidate]).at(s.pixels), s.images) for s in seen]
 
-    chosen, found = _least("decimate.resolution", MESHES, pictures, photos, MESH_LOSS)
+    chosen, found = _least("decimate.resolution", MESHES, pictures, [s.photo for s in seen], MESH_LOSS)
     return chosen, fact("resolution_chosen", **found, views=len(looks), split=split)
 
 
@@ -186,22 +194,12 @@ def choose_texels(scene: Scene, meshes: Sequence[TexturedMesh], grids: Grids, te
     """
     candidates = sorted({c for c in TEXELS if c < textures.height} | {textures.height})
     split, looks = looks_of(scene)
-    rng, near, photos = np.random.default_rng(0), list[Hits](), list[NDArray[np.float64]]()
-    images = {look.frame: _images(textures, look.frame) for look in looks}
-    for look in looks:
-        hits = cast_layers(look.camera, meshes)
-        pixels = hits.choose(rng, RAYS)
-        near.append(hits.at(pixels))
-        photos.append(_photo(scene, look, hits, pixels, images[look.frame], grids))
+    seen = _seen(scene, looks, meshes, grids, textures)
+    images = {s.look.frame: s.images for s in seen}
 
     def pictures(candidate: int) -> list[Picture]:
         small = {k: [resample(image, candidate) for image in frame] for k, frame in images.items()}
-        return [composite(hits, small[look.frame]) for hits, look in zip(near, looks, strict=True)]
+        return [composite(s.hits, small[s.look.frame]) for s in seen]
 
-    chosen, found = _least("texture.resolution", candidates, pictures, photos, TEXEL_LOSS)
+    chosen, found = _least("texture.resolution", candidates, pictures, [s.photo for s in seen], TEXEL_LOSS)
     return chosen, fact("resolution_chosen", **found, views=len(looks), split=split)
-
-
-def _images(textures: FrameStore, frame: int) -> list[Texture]:
-    layers = sorted({layer for layer, _ in textures})
-    return [textures.image(layer, frame) for layer in layers]

@@ -8,7 +8,6 @@ with its border kept misses the bound on the vertices and errs more at the same 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Literal
 
 import fast_simplification
 import numpy as np
@@ -58,7 +57,10 @@ def decimate_layers(
                 remedy="raise this R^m where it stands: decimate.resolution or a level's "
                 "mesh_resolution in compress.levels",
             )
-        st = layer_st(coarse.vertices, grids, i, params.uv)
+        if params.uv == "exact":
+            st = exact_st(coarse.vertices, grids.window(i), grids.chart)
+        else:
+            st = nearest_st(coarse.vertices, grids.points[i], grids.valid[i])
         meshes.append(TexturedMesh(coarse.vertices, coarse.faces, st))
     return meshes
 
@@ -90,16 +92,6 @@ def upright_faces(vertices: NDArray[np.float32], faces: NDArray[np.int32], chart
     a, b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     outward = (np.cross(a, b) * chart.outward(corners.mean(1))).sum(-1) > 0
     return np.asarray(outward & ~degenerate_faces(vertices, faces))
-
-
-def layer_st(
-    vertices: NDArray[np.float32], grids: Grids, layer: int, uv: Literal["nearest", "exact"]
-) -> NDArray[np.float32]:
-    """(V, 2) float32 layer-local texture coordinates of a layer's vertices."""
-    window = grids.window(layer)
-    if uv == "exact":
-        return exact_st(vertices, window, grids.chart)
-    return nearest_st(vertices, grids.points[layer], grids.valid[layer])
 
 
 def nearest_st(

@@ -17,6 +17,7 @@ others, and every video segment would have to be encoded again.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -25,12 +26,12 @@ from numpy.typing import NDArray
 
 from facefolds_core.config.source_code import digest_of_packages
 from facefolds_core.export.hold_kernel import add_weights, hold
-from facefolds_core.export.kept import KeptFrames, digest_of, digest_of_frame
+from facefolds_core.export.kept import KeptFrames, digest_of
 from facefolds_core.files.frame_store import FrameStore
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.kernels.hit_codes import before, encode
-from facefolds_core.progress import progress as progress_bar
+from facefolds_core.progress import progress
 from facefolds_core.rendering.raster import cast_mesh
 from facefolds_core.spacing import spread
 
@@ -48,7 +49,7 @@ MEMORY = 32 << 20
 
 
 def shown_rays(
-    cameras: Sequence[Camera], meshes: Sequence[TexturedMesh], opacity: NDArray[np.uint8], progress: bool = True
+    cameras: Sequence[Camera], meshes: Sequence[TexturedMesh], opacity: NDArray[np.uint8]
 ) -> NDArray[np.uint16]:
     """(P, N, 2): where rays through pixel centres meet the layers (kernels/hit_codes.py); those that may show anything.
 
@@ -59,7 +60,7 @@ def shown_rays(
     some[:, :-1] |= some[:, 1:]  # any of the four texels around a place
     some[:, :, :-1] |= some[:, :, 1:]
     found = []
-    for camera in progress_bar(cameras, desc="rays", unit="camera", disable=not progress):
+    for camera in progress(cameras, desc="rays", unit="camera"):
         codes = np.zeros((camera.height * camera.width, len(meshes), 2), np.uint16)
         shows = np.zeros(len(codes), bool)
         for layer, mesh in enumerate(meshes):
@@ -113,7 +114,6 @@ def held_rows(
     memory: int = MEMORY,
     window: int = WINDOW,
     kept: KeptFrames | None = None,
-    progress: bool = True,
 ) -> Iterator[tuple[int, int, NDArray[np.uint8]]]:
     """All textures, held: part by part, and in each layer by layer.
 
@@ -129,11 +129,14 @@ def held_rows(
     made = parts(len(frames), window)
     shown = {frames[own.start]: [frames[k] for k in around] for own, around in made}
     common = digest_of({"weights": weights, "price": price, "code": digest_of_packages("export")})
-    digests = _Digests(textures, layers)
+
+    @cache
+    def digest_of_images(frame: int) -> bytes:
+        return digest_of({str(layer): textures.image(layer, frame) for layer in layers})
 
     def digest(own: Sequence[int]) -> str:
         around = shown[own[0]]
-        said = [around.index(own[0]), len(own), *(digests.of(frame) for frame in around)]
+        said = [around.index(own[0]), len(own), *map(digest_of_images, around)]
         return digest_of({"common": common, "frames": said}).hex()
 
     def make(own: Sequence[int], layer: int) -> Iterator[NDArray[np.uint8]]:
@@ -143,23 +146,9 @@ def held_rows(
         yield from (image for position, image in enumerate(held) if first <= position < first + len(own))
 
     earlier = KeptFrames(None) if kept is None else kept
-    with progress_bar(total=len(made) * len(layers), desc="hold", unit="layer", disable=not progress) as bar:
+    with progress(total=len(made) * len(layers), desc="hold", unit="layer") as bar:
         groups = [[frames[k] for k in own] for own, _ in made]
         yield from earlier.groups(groups, layers, digest, make, lambda: bar.update())
-
-
-class _Digests:
-    """Of frames of a store, each looked at once."""
-
-    def __init__(self, textures: FrameStore, layers: Sequence[int]) -> None:
-        self._textures, self._layers = textures, layers
-        self._known: dict[int, str] = {}
-
-    def of(self, frame: int) -> str:
-        if frame not in self._known:
-            images = (self._textures.image(layer, frame) for layer in self._layers)
-            self._known[frame] = digest_of_frame(b"", images)
-        return self._known[frame]
 
 
 def _held_layer(

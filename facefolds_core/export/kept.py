@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from facefolds_core.errors import UserError
 from facefolds_core.files.frame_store import FrameStore, Image
@@ -30,14 +29,6 @@ def digest_of(values: Mapping[str, Any]) -> bytes:
         else:
             digest.update(repr(value).encode())
     return digest.digest()
-
-
-def digest_of_frame(common: bytes, images: Iterable[NDArray[Any]]) -> str:
-    """Of what a frame is made of: its arrays in their order, and `common`, which all frames are made of."""
-    digest = hashlib.blake2b(common, digest_size=16)
-    for image in images:
-        digest.update(np.ascontiguousarray(image).data)
-    return digest.hexdigest()
 
 
 class KeptFrames:

@@ -120,11 +120,10 @@ def reconstruct(samples: Samples, params: ReconstructParams, layer: int) -> Surf
     Raises:
         UserError: see `reconstruct_layers`.
     """
-    place = f"layer {layer} (0 is the outermost)"
+    wrong = partial(UserError, place=f"layer {layer} (0 is the outermost)")
     if len(samples.points) < MIN_SAMPLES:
-        raise UserError(
+        raise wrong(
             "a layer has too few samples for a surface",
-            place=place,
             expected=f"at least {MIN_SAMPLES} valid samples",
             found=len(samples.points),
             remedy="raise sample.resolution or reconstruct.resolution, or train longer or with fewer layers",
@@ -133,9 +132,8 @@ def reconstruct(samples: Samples, params: ReconstructParams, layer: int) -> Surf
     if len(faces):
         vertices, faces = trim(vertices, faces, samples)
     if len(faces) == 0:
-        raise UserError(
+        raise wrong(
             "Poisson reconstruction gave no surface near the samples",
-            place=place,
             expected="a sheet through the samples",
             found="nothing",
             remedy="raise reconstruct.depth, or look at the layer's samples in samples/grids.npz",

@@ -77,16 +77,15 @@ def sample_grids(model: RadianceManifolds, resolution: int, window: Window) -> G
     return Grids(points, normals.astype(np.float32), valid, valid.astype(np.uint8) * 255, windows, model.chart)
 
 
+AGAIN = "train again, with lower learning rates or another seed"
+
+
 def _check_points(points: NDArray[np.float32], valid: NDArray[np.bool_]) -> None:
     for layer, (p, v) in enumerate(zip(points, valid, strict=True)):
         if not np.isfinite(p).all():
-            raise UserError(
-                "the model's surface has points that are not finite",
-                place=f"layer {layer}",
-                expected="finite coordinates",
-                found=f"{int((~np.isfinite(p)).any(-1).sum())} points with NaN or infinity",
-                remedy="train again, with lower learning rates or another seed",
-            )
+            message = "the model's surface has points that are not finite"
+            found = f"{int((~np.isfinite(p)).any(-1).sum())} points with NaN or infinity"
+            raise UserError(message, place=f"layer {layer}", expected="finite coordinates", found=found, remedy=AGAIN)
         if not v.any():
             raise UserError(
                 "a layer has no surface in any sampled direction",
@@ -171,14 +170,10 @@ class _Sheet:
         (left, top), (right, bottom) = np.asarray(uv_to_st(corners, grid.window)).tolist()
         self._projection = Projection(grid.shape, (len(valid), len(valid)), (top, bottom, left, right))
 
-    def texels(self, frame: int) -> NDArray[np.float32]:
-        """(M, 4) RGBA in [0, 1]: the model's own texels where it has any, else what it shows at the layer's."""
-        uv = torch.as_tensor(self._uv).to(self._model.centre.detach())
-        return _texels(self._model, uv, self._layer, frame)
-
     def image(self, frame: int) -> NDArray[np.uint8]:
         """(R, R, 4) RGBA: of a model with texels, those that interpolate to what it shows; of others, its values."""
-        values = self.texels(frame)
+        uv = torch.as_tensor(self._uv).to(self._model.centre.detach())
+        values = _texels(self._model, uv, self._layer, frame)
         if self._grid is not None:
             values = self._projection(values.reshape(*self._grid.shape, 4))[self._valid]
         image = np.zeros((*self._valid.shape, 4), np.uint8)
@@ -197,7 +192,7 @@ def _texels(model: RadianceManifolds, uv: Tensor, layer: int, frame: int) -> NDA
             place=f"layer {layer}, frame {frame}",
             expected="colours and alpha in [0, 1]",
             found="NaN or infinity",
-            remedy="train again, with lower learning rates or another seed",
+            remedy=AGAIN,
         )
     return np.asarray(rgba.clamp(0, 1).cpu().numpy(), np.float32)
 

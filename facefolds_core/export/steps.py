@@ -100,7 +100,12 @@ def decimate_all(
     """
     given = params.resolution
     tried = MESHES if given == "auto" else (given,)
-    ladder = decimate(surfaces, grids, params, sorted({*tried, *levels}))
+    wanted = sorted({*tried, *levels})
+    if isinstance(surfaces, Sheets):
+        by_count = decimated_ladder(surfaces, [r**2 for r in wanted])
+        ladder = {r: by_count[r**2] for r in wanted}
+    else:
+        ladder = {r: decimate_layers(surfaces, grids, r, params) for r in wanted}
     chosen, why = (given, None) if given != "auto" else choose_meshes(scene, ladder, grids, FrameStore(samples))
     return Decimated(ladder[chosen], {r: ladder[min(r, chosen)] for r in levels}, why)
 
@@ -112,16 +117,6 @@ def texels_for(
     if params.resolution == "auto":
         return choose_texels(scene, meshes, grids, FrameStore(samples))
     return params.resolution, None
-
-
-def decimate(
-    surfaces: Surfaces, grids: Grids, params: DecimateParams, resolutions: Sequence[int]
-) -> dict[int, list[TexturedMesh]]:
-    """R^m -> every layer with at most R^m x R^m vertices, and texture coordinates; `params.resolution` is not read."""
-    if isinstance(surfaces, Sheets):
-        ladder = decimated_ladder(surfaces, [r**2 for r in resolutions])
-        return {r: ladder[r**2] for r in resolutions}
-    return {r: decimate_layers(surfaces, grids, r, params) for r in resolutions}
 
 
 def bake(

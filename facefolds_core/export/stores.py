@@ -1,19 +1,16 @@
 """The geometry files between the export stages: sampled grids, surfaces, textured meshes. All are npz archives.
 
-- `samples/grids.npz`: points and normals (N, R, R, 3) float32, valid (N, R, R) bool, opacity (N, R, R) uint8,
-  windows (N, 4) float64, centre (3,) float64, belt (2,) float64 if the chart has one; of a model with a reflection its
-  arrays, as `reflection_gloss`, ...;
-- `surfaces/surfaces.npz`: of `poisson` vertices_00 (V, 3) float32, faces_00 (F, 3) int32, ... one pair a layer; of
-  `grid` the arrays of `Sheets`;
-- `meshes/meshes.npz`: such pairs and st_00 (V, 2) float32, layer-local texture coordinates.
+- `samples/grids.npz`: `GRIDS`, `CHART`, and of a model with a reflection `REFLECTION`;
+- `surfaces/surfaces.npz`: of `grid` `SHEETS` and `CHART`; of `poisson` vertices_00, faces_00, ... one pair a layer;
+- `meshes/meshes.npz`: such pairs and st_00, layer-local texture coordinates.
 
 Layers are outermost first. Every array is checked when it is read: shape, type, finite numbers, indices in range.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
@@ -92,10 +89,39 @@ class Sheets:
         return len(self.radii)
 
 
+Arrays = dict[str, NDArray[Any]]
+Kinds = Mapping[str, tuple[type[np.generic], tuple[int | str, ...]]]
+"""Name of an array -> its type and shape; a letter stands for one size wherever it stands."""
+
+GRIDS: Kinds = {
+    "points": (np.float32, ("N", "R", "R", 3)),
+    "normals": (np.float32, ("N", "R", "R", 3)),
+    "valid": (np.bool_, ("N", "R", "R")),
+    "opacity": (np.uint8, ("N", "R", "R")),
+    "windows": (np.float64, ("N", 4)),
+}
+REFLECTION: Kinds = {
+    "reflection_window": (np.float64, (4,)),
+    "reflection_gloss": (np.float32, ("h", "w")),
+    "reflection_offset": (np.float32, ("h", "w", 3)),
+    "reflection_normals": (np.float32, ("h", "w", 3)),
+    "reflection_environment": (np.float32, ("e", "e", 3)),
+}
+SHEETS: Kinds = {
+    "radii": (np.float32, ("N", "n", "n")),
+    "st": (np.float64, ("n", "n", 2)),
+    "valid": (np.bool_, ("N", "n", "n")),
+    "opacity": (np.uint8, ("N", "n", "n")),
+    "falling": (np.bool_, ("m", "m")),
+    "window": (np.float64, (4,)),
+}
+CHART: Kinds = {"centre": (np.float64, (3,)), "belt": (np.float64, (2,))}
+SURFACE: Kinds = {"vertices": (np.float32, ("V", 3)), "faces": (np.int32, ("F", 3))}
+TEXTURED: Kinds = {**SURFACE, "st": (np.float32, ("V", 2))}
+
+
 def write_grids(path: Path, grids: Grids) -> None:
-    apart = ("reflection", "chart")
-    arrays = {field.name: getattr(grids, field.name) for field in fields(grids) if field.name not in apart}
-    arrays |= _chart_arrays(grids.chart)
+    arrays = {name: getattr(grids, name) for name in GRIDS} | _chart_arrays(grids.chart)
     if grids.reflection is not None:
         arrays |= {f"reflection_{name}": np.asarray(value) for name, value in vars(grids.reflection).items()}
     _write(path, arrays)
@@ -104,67 +130,46 @@ def write_grids(path: Path, grids: Grids) -> None:
 def read_grids(path: Path) -> Grids:
     """Raises UserError if the file is missing, damaged or not what `write_grids` writes."""
     arrays = _read(path)
-    n, r = _shape(arrays, path, "points", 2)[:2]
-    grids = Grids(
-        points=_take(arrays, path, "points", (n, r, r, 3), np.float32),
-        normals=_take(arrays, path, "normals", (n, r, r, 3), np.float32),
-        valid=_take(arrays, path, "valid", (n, r, r), np.bool_),
-        opacity=_take(arrays, path, "opacity", (n, r, r), np.uint8),
-        windows=_take(arrays, path, "windows", (n, 4), np.float64),
-        chart=_take_chart(arrays, path),
-    )
-    _check_windows(grids.windows, path)
-    return replace(grids, reflection=read_reflection_maps(path))
+    taken = _take(arrays, path, GRIDS)
+    _check_windows(taken["windows"], path)
+    return Grids(**taken, chart=_take_chart(arrays, path), reflection=_take_reflection(arrays, path))
 
 
-def read_reflection_maps(path: Path) -> ReflectionMaps | None:
-    """Only the reflection in a file of `write_grids`, None where there is none; raises as `read_grids` does."""
-    arrays = _read(path, {f"reflection_{field.name}" for field in fields(ReflectionMaps)})
-    if not arrays:
-        return None
-    window = _take(arrays, path, "reflection_window", (4,), np.float64)
-    _check_windows(window[None], path)
-    h, w = _shape(arrays, path, "reflection_gloss", 2)[:2]
-    e = _shape(arrays, path, "reflection_environment", 2)[0]
-    u0, u1, v0, v1 = (float(x) for x in window)
-    return ReflectionMaps(
-        window=(u0, u1, v0, v1),
-        gloss=_take(arrays, path, "reflection_gloss", (h, w), np.float32),
-        offset=_take(arrays, path, "reflection_offset", (h, w, 3), np.float32),
-        normals=_take(arrays, path, "reflection_normals", (h, w, 3), np.float32),
-        environment=_take(arrays, path, "reflection_environment", (e, e, 3), np.float32),
-    )
-
-
-def read_windows(path: Path) -> list[Window]:
-    """Only the windows (u0, u1, v0, v1) of the layers in a file of `write_grids`; raises as `read_grids` does."""
-    arrays = _read(path, {"windows"})
-    windows = _take(arrays, path, "windows", (len(arrays.get("windows", ())), 4), np.float64)
+def read_places(path: Path) -> tuple[list[Window], Chart, ReflectionMaps | None]:
+    """Only windows, chart and reflection in a file of `write_grids`; raises as `read_grids` does."""
+    arrays = _read(path, {"windows", *CHART, *REFLECTION})
+    windows = _take(arrays, path, {"windows": GRIDS["windows"]})["windows"]
     _check_windows(windows, path)
-    return [(float(u0), float(u1), float(v0), float(v1)) for u0, u1, v0, v1 in windows]
+    places = [(float(u0), float(u1), float(v0), float(v1)) for u0, u1, v0, v1 in windows]
+    return places, _take_chart(arrays, path), _take_reflection(arrays, path)
 
 
-def read_chart(path: Path) -> Chart:
-    """Only the chart in a file of `write_grids`; raises as `read_grids` does."""
-    return _take_chart(_read(path, {"centre", "belt"}), path)
+def _take_reflection(arrays: Arrays, path: Path) -> ReflectionMaps | None:
+    if not arrays.keys() & REFLECTION.keys():
+        return None
+    taken = {name.removeprefix("reflection_"): array for name, array in _take(arrays, path, REFLECTION).items()}
+    window = taken.pop("window")
+    _check_windows(window[None], path)
+    u0, u1, v0, v1 = window.tolist()
+    return ReflectionMaps((u0, u1, v0, v1), **taken)
 
 
-def _chart_arrays(chart: Chart) -> dict[str, NDArray[Any]]:
+def _chart_arrays(chart: Chart) -> Arrays:
     arrays = {"centre": np.array(chart.centre, np.float64)}
     if chart.belt is not None:
         arrays["belt"] = np.array([chart.belt.elevation, chart.belt.girth], np.float64)
     return arrays
 
 
-def _take_chart(arrays: dict[str, NDArray[Any]], path: Path) -> Chart:
+def _take_chart(arrays: Arrays, path: Path) -> Chart:
     """Of files from before there were belts, too."""
-    x, y, z = (float(value) for value in _take(arrays, path, "centre", (3,), np.float64))
-    if "belt" not in arrays:
+    taken = _take(arrays, path, {name: kind for name, kind in CHART.items() if name == "centre" or name in arrays})
+    x, y, z = taken["centre"].tolist()
+    if "belt" not in taken:
         return Chart((x, y, z))
-    elevation, girth = (float(value) for value in _take(arrays, path, "belt", (2,), np.float64))
-    belt = Belt(elevation, girth)
+    belt = Belt(*taken["belt"].tolist())
     if not belt.sound:
-        raise _damaged(path, "belt", f"one {Belt.BOUNDS}", [elevation, girth])
+        raise _damaged(path, "belt", f"one {Belt.BOUNDS}", taken["belt"].tolist())
     return Chart((x, y, z), belt)
 
 
@@ -175,74 +180,60 @@ def _check_windows(windows: NDArray[np.float64], path: Path) -> None:
         raise _damaged(path, "windows", expected, windows.tolist())
 
 
-def write_surfaces(path: Path, surfaces: Sequence[Surface]) -> None:
-    arrays: dict[str, NDArray[Any]] = {}
-    for i, surface in enumerate(surfaces):
-        arrays |= {f"vertices_{i:02d}": surface.vertices, f"faces_{i:02d}": surface.faces}
-    _write(path, arrays)
-
-
-def read_surfaces(path: Path) -> list[Surface]:
-    """Raises UserError if the file is missing, damaged or not what `write_surfaces` writes."""
-    arrays = _read(path)
-    return [_surface(arrays, path, i) for i in range(_count(arrays, path))]
-
-
 def write_sheets(path: Path, sheets: Sheets) -> None:
     arrays = {field.name: getattr(sheets, field.name) for field in fields(sheets) if field.name != "chart"}
     _write(path, arrays | _chart_arrays(sheets.chart))
 
 
-def holds_sheets(path: Path) -> bool:
-    """Whether a file of surfaces was written by `write_sheets`; raises as `read_sheets` does."""
-    return "radii" in _read(path, {"radii"})
+def write_meshes(path: Path, meshes: Sequence[Surface]) -> None:
+    """With texture coordinates where they have them."""
+    _write(path, {f"{name}_{i:02d}": array for i, mesh in enumerate(meshes) for name, array in vars(mesh).items()})
 
 
-def read_sheets(path: Path) -> Sheets:
-    """Raises UserError if the file is missing, damaged or not what `write_sheets` writes."""
+def read_surfaces(path: Path) -> Sheets | list[Surface]:
+    """Raises UserError if the file is missing, damaged or not what `write_sheets` or `write_meshes` writes."""
     arrays = _read(path)
-    layers, n = _shape(arrays, path, "radii", 2)[:2]
-    sheets = Sheets(
-        st=_take(arrays, path, "st", (n, n, 2), np.float64),
-        radii=_take(arrays, path, "radii", (layers, n, n), np.float32),
-        valid=_take(arrays, path, "valid", (layers, n, n), np.bool_),
-        opacity=_take(arrays, path, "opacity", (layers, n, n), np.uint8),
-        falling=_take(arrays, path, "falling", (n - 1, n - 1), np.bool_),
-        window=_take(arrays, path, "window", (4,), np.float64),
-        chart=_take_chart(arrays, path),
-    )
+    if "radii" not in arrays:
+        return [Surface(**parts) for parts in _take_meshes(arrays, path, SURFACE)]
+    taken = _take(arrays, path, SHEETS)
+    n = len(taken["st"])
+    if len(taken["falling"]) != n - 1:
+        raise _damaged(path, "falling", f"bool {(n - 1, n - 1)}", taken["falling"].shape)
+    sheets = Sheets(**taken, chart=_take_chart(arrays, path))
     _check_windows(sheets.window[None], path)
     if not ((sheets.radii > 0).all() and (np.diff(sheets.radii, axis=0) <= 0).all()):
         raise _damaged(path, "radii", "positive radii that fall from layer to layer", "others")
     return sheets
 
 
-def write_meshes(path: Path, meshes: Sequence[TexturedMesh]) -> None:
-    arrays: dict[str, NDArray[Any]] = {}
-    for i, mesh in enumerate(meshes):
-        arrays |= {f"vertices_{i:02d}": mesh.vertices, f"faces_{i:02d}": mesh.faces, f"st_{i:02d}": mesh.st}
-    _write(path, arrays)
-
-
 def read_meshes(path: Path) -> list[TexturedMesh]:
     """Raises UserError if the file is missing, damaged or not what `write_meshes` writes."""
-    arrays = _read(path)
-    meshes = []
-    for i in range(_count(arrays, path)):
-        surface = _surface(arrays, path, i)
-        st = _take(arrays, path, f"st_{i:02d}", (len(surface.vertices), 2), np.float32)
+    meshes = [TexturedMesh(**parts) for parts in _take_meshes(_read(path), path, TEXTURED)]
+    for i, st in enumerate(mesh.st for mesh in meshes):
         if st.min() < 0 or st.max() > 1:
             raise _damaged(path, f"st_{i:02d}", "texture coordinates in [0, 1]", f"{st.min()} to {st.max()}")
-        meshes.append(TexturedMesh(surface.vertices, surface.faces, st))
     return meshes
 
 
-def _write(path: Path, arrays: dict[str, NDArray[Any]]) -> None:
+def _take_meshes(arrays: Arrays, path: Path, kinds: Kinds) -> list[Arrays]:
+    """The arrays of each mesh, without their numbers."""
+    meshes = []
+    for i in range(max(1, sum(name.startswith("vertices_") for name in arrays))):
+        taken = _take(arrays, path, {f"{name}_{i:02d}": kind for name, kind in kinds.items()})
+        parts = {name[:-3]: array for name, array in taken.items()}
+        faces, count = parts["faces"], len(parts["vertices"])
+        if faces.min() < 0 or faces.max() >= count:
+            raise _damaged(path, f"faces_{i:02d}", f"indices below {count}", f"{faces.min()} to {faces.max()}")
+        meshes.append(parts)
+    return meshes
+
+
+def _write(path: Path, arrays: Arrays) -> None:
     with atomic_file(path) as temporary:
         np.savez(temporary, **arrays)  # type: ignore[arg-type]  # numpy's stub takes the ** for its own keyword
 
 
-def _read(path: Path, names: set[str] | None = None) -> dict[str, NDArray[Any]]:
+def _read(path: Path, names: Collection[str] | None = None) -> Arrays:
     """The archive's arrays by name; all, or those of `names` that are there."""
     return read_npz(path, "a damaged geometry file", names)
 
@@ -253,37 +244,18 @@ def _damaged(path: Path, name: str, expected: object, found: object) -> UserErro
     )
 
 
-def _shape(arrays: dict[str, NDArray[Any]], path: Path, name: str, axes: int = 1) -> tuple[int, ...]:
-    if name not in arrays:
-        raise _damaged(path, name, "an array of this name", ", ".join(sorted(arrays)) or "nothing")
-    if arrays[name].ndim < axes or 0 in arrays[name].shape:
-        raise _damaged(path, name, "an array that is not empty", arrays[name].shape)
-    return arrays[name].shape
-
-
-def _take(
-    arrays: dict[str, NDArray[Any]], path: Path, name: str, shape: tuple[int, ...], kind: type[np.generic]
-) -> NDArray[Any]:
-    _shape(arrays, path, name)
-    array = arrays[name]
-    if array.shape != shape or array.dtype != kind:
-        raise _damaged(path, name, f"{kind.__name__} {shape}", f"{array.dtype} {array.shape}")
-    if not np.isfinite(array).all():
-        raise _damaged(path, name, "finite numbers", "NaN or infinity")
-    return array
-
-
-def _count(arrays: dict[str, NDArray[Any]], path: Path) -> int:
-    count = sum(name.startswith("vertices_") for name in arrays)
-    if count == 0:
-        raise _damaged(path, "vertices_00", "an array of this name", ", ".join(sorted(arrays)) or "nothing")
-    return count
-
-
-def _surface(arrays: dict[str, NDArray[Any]], path: Path, layer: int) -> Surface:
-    vertices_name, faces_name = f"vertices_{layer:02d}", f"faces_{layer:02d}"
-    vertices = _take(arrays, path, vertices_name, (_shape(arrays, path, vertices_name)[0], 3), np.float32)
-    faces = _take(arrays, path, faces_name, (_shape(arrays, path, faces_name)[0], 3), np.int32)
-    if faces.min() < 0 or faces.max() >= len(vertices):
-        raise _damaged(path, faces_name, f"indices below {len(vertices)}", f"{faces.min()} to {faces.max()}")
-    return Surface(vertices, faces)
+def _take(arrays: Arrays, path: Path, kinds: Kinds) -> Arrays:
+    """Those of `kinds`, each as it says, not empty, and finite."""
+    sizes = dict[int | str, int]()
+    for name, (kind, shape) in kinds.items():
+        if name not in arrays:
+            raise _damaged(path, name, "an array of this name", ", ".join(sorted(arrays)) or "nothing")
+        array = arrays[name]
+        for letter, size in zip(shape, array.shape, strict=False):
+            sizes.setdefault(letter, letter if isinstance(letter, int) else size)
+        wanted = tuple(sizes.get(letter, letter) for letter in shape)
+        if array.shape != wanted or array.dtype != kind or array.size == 0:
+            raise _damaged(path, name, f"{kind.__name__} {wanted}, not empty", f"{array.dtype} {array.shape}")
+        if not np.isfinite(array).all():
+            raise _damaged(path, name, "finite numbers", "NaN or infinity")
+    return {name: arrays[name] for name in kinds}

@@ -23,12 +23,16 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from facefolds_core.errors import UserError, disk_error, is_disk_error
-from facefolds_core.files.frame_packing import PACKING, Packer, unpacked
 from facefolds_core.files.reading import check_regular, no_memory, remake
 from facefolds_core.files.writing import atomic_file
 
 Image = NDArray[np.uint8]
 
+PACKING = "zstd"
+"""Of packed files, in their metadata."""
+
+RUN = 12
+"""Images that hang together, at most: who looks at a single one unpacks so many."""
 
 NAMES = ("camera", "frame", "pixels", "after")
 
@@ -250,3 +254,40 @@ def _places(reader: pa.RecordBatchFileReader, file: pa.Buffer, shape: tuple[int,
     if not ((places.keys[found] == before) & (order[found] < order[chained])).all() or (places.after < -1).any():
         raise ValueError("an image after one that does not come before it")
     return places
+
+
+def unpacked(data: pa.Buffer, shape: tuple[int, int, int], before: Image | None) -> Image:
+    """The image of what `Packer` made of it.
+
+    Args:
+        before: the image that it is the difference from, None if it stands alone.
+
+    Raises:
+        ValueError, ArrowException: if the data are damaged.
+    """
+    flat = pa.decompress(data, shape[0] * shape[1] * shape[2], PACKING)
+    difference = np.frombuffer(flat, np.uint8).reshape(shape)
+    if before is None:
+        return np.cumsum(difference, axis=1, dtype=np.uint8)
+    return np.asarray(before + difference, np.uint8)
+
+
+class Packer:
+    """Packs the images of any number of indices, each in the order of its frames: neighbours differ little."""
+
+    def __init__(self) -> None:
+        self._last: dict[int, tuple[int, Image]] = {}
+        self._run: dict[int, int] = {}
+
+    def pack(self, index: int, frame: int, image: Image) -> tuple[int, bytes]:
+        """The frame whose image it is the difference from, or -1; and the packed difference."""
+        after, before = self._last.get(index, (-1, image))
+        self._run[index] = run = (self._run.get(index, 0) + 1) % RUN if 0 <= after < frame else 0
+        if run == 0:
+            after, difference = -1, image.copy()
+            difference[:, 1:] -= image[:, :-1]  # wraps around, as the sum does
+        else:
+            difference = image - before
+        self._last[index] = (frame, image.copy())
+        packed: bytes = pa.compress(np.ascontiguousarray(difference).data, PACKING, asbytes=True)
+        return after, packed

@@ -14,6 +14,16 @@ NAMES = "letters (a to z), digits, _ and -, at most 64 of them, the first one no
 """What a subject's name may be: it becomes a folder, and a part of commands that people type."""
 
 
+class _Within:
+    """A path in the subject's folder."""
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+
+    def __get__(self, folders: SubjectFolders, _: object) -> Path:
+        return folders.root / self.name
+
+
 @dataclass(frozen=True)
 class SubjectFolders:
     """Paths of one subject's files.
@@ -24,84 +34,28 @@ class SubjectFolders:
 
     root: Path
 
+    capture = _Within("capture")  # capture: the embedded actor in the Multiface layout; others: only `source.json`
+    scene = _Within("scene")  # normalize: the normalised scene (captures/scene.py)
+    subject = _Within("subject")  # subject: who stands where (subject/folder.py)
+    model = _Within("model")  # train: `model.safetensors`, `model.json`, `training.json`
+    # train and later stages: no output of any, so that a later run takes over what it would make again
+    checkpoints = _Within("checkpoints")
+    training_log = _Within("training")  # train: dvclive's folder
+    samples = _Within("samples")  # sample: `grids.npz` and `textures.arrow`
+    surfaces = _Within("surfaces")  # reconstruct: `surfaces.npz`
+    meshes = _Within("meshes")  # decimate: `meshes.npz`
+    resampled = _Within("resampled")  # texture: `textures.arrow`
+    textures = _Within("textures")  # bake: `textures.arrow`, which ship
+    asset = _Within("asset")  # compress: what ships
+    glb = _Within("asset.glb")  # compress: one frame of the asset as binary glTF
+    # evaluate: `per_image.parquet`, `contact_sheet.png`, `worst.png`, films, pictures of bad training views
+    evaluation = _Within("evaluation")
+    metrics = _Within("metrics.json")
+
     @property
     def config(self) -> Path:
         """configure: one JSON a stage. They lie beside the subject's folder, since one stage writes all subjects'."""
         return self.root.parent / ".config" / self.root.name
-
-    @property
-    def capture(self) -> Path:
-        """capture: the embedded actor in the Multiface layout; for other sources only `source.json`."""
-        return self.root / "capture"
-
-    @property
-    def scene(self) -> Path:
-        """normalize: the normalised scene (captures/scene.py)."""
-        return self.root / "scene"
-
-    @property
-    def subject(self) -> Path:
-        """subject: who stands where (subject/folder.py)."""
-        return self.root / "subject"
-
-    @property
-    def model(self) -> Path:
-        """train: `model.safetensors`, `model.json`, `training.json`."""
-        return self.root / "model"
-
-    @property
-    def checkpoints(self) -> Path:
-        """train and later stages: no output of any, so that a later run takes over what it would make again."""
-        return self.root / "checkpoints"
-
-    @property
-    def training_log(self) -> Path:
-        """train: dvclive's folder."""
-        return self.root / "training"
-
-    @property
-    def samples(self) -> Path:
-        """sample: `grids.npz` and `textures.arrow`."""
-        return self.root / "samples"
-
-    @property
-    def surfaces(self) -> Path:
-        """reconstruct: `surfaces.npz`."""
-        return self.root / "surfaces"
-
-    @property
-    def meshes(self) -> Path:
-        """decimate: `meshes.npz`."""
-        return self.root / "meshes"
-
-    @property
-    def resampled(self) -> Path:
-        """texture: `textures.arrow`."""
-        return self.root / "resampled"
-
-    @property
-    def textures(self) -> Path:
-        """bake: `textures.arrow`, which ship."""
-        return self.root / "textures"
-
-    @property
-    def asset(self) -> Path:
-        """compress: what ships."""
-        return self.root / "asset"
-
-    @property
-    def glb(self) -> Path:
-        """compress: one frame of the asset as binary glTF."""
-        return self.root / "asset.glb"
-
-    @property
-    def evaluation(self) -> Path:
-        """evaluate: `per_image.parquet`, `contact_sheet.png`, `worst.png`, films, pictures of bad training views."""
-        return self.root / "evaluation"
-
-    @property
-    def metrics(self) -> Path:
-        return self.root / "metrics.json"
 
     def timing(self, stage: str) -> Path:
         """Seconds that a stage took, read by evaluate. Why they lie beside the subject's folder: .dvcignore."""

@@ -32,26 +32,27 @@ _ODD = {
 }
 _WIDE = {b"\xff\xfe": "UTF-16", b"\xfe\xff": "UTF-16"}
 
-STAGE_OF = {
-    "config": "configure",
-    "capture": "capture",
-    "scene": "normalize",
-    "subject": "subject",
-    "model": "train",
-    "samples": "sample",
-    "surfaces": "reconstruct",
-    "meshes": "decimate",
-    "resampled": "texture",
-    "textures": "bake",
-    "evaluation": "evaluate",
+STAGE_OUTPUTS: dict[str, tuple[str, ...]] = {
+    "capture": ("capture",),
+    "normalize": ("scene",),
+    "subject": ("subject",),
+    "train": ("model", "training"),
+    "sample": ("samples",),
+    "reconstruct": ("surfaces",),
+    "decimate": ("meshes",),
+    "texture": ("resampled",),
+    "bake": ("textures",),
+    "compress": ("asset", "asset.glb"),
+    "evaluate": ("evaluation", "metrics.json"),
 }
-"""Folder in data/<subject> -> the stage that writes it."""
+"""What each stage leaves in data/<subject>, in the order in which they run."""
+_STAGE_OF = {name: stage for stage, names in STAGE_OUTPUTS.items() for name in names} | {"config": "configure"}
 
 
 def remake(path: str | Path) -> str:
     """The remedy for a damaged file of our own, data/SUBJECT/FOLDER/NAME: which stage makes it again."""
     folder = Path(path).parent
-    stage = STAGE_OF.get(folder.name)
+    stage = _STAGE_OF.get(folder.name)
     target = f" {stage}@{folder.parent.name}" if stage and folder.parent.name else ""
     return f"delete it and run `dvc repro{target}`, which makes it again"
 

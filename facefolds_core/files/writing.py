@@ -19,13 +19,14 @@ import shutil
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from io import FileIO
 from pathlib import Path
 from typing import Any
 
 from facefolds_core.errors import UserError
 from facefolds_core.files.parsing import parse_json
 from facefolds_core.files.reading import read_text
-from facefolds_core.system.locks import Lock, try_lock
+from facefolds_core.system.locks import try_lock
 
 PREFIX = ".facefolds-temporary-"
 MARK = "facefolds-temporary"
@@ -124,10 +125,10 @@ def _workplace(target: Path) -> Iterator[tuple[Path, Path]]:
     finally:
         with suppress(OSError):
             _settle(folder)
-        lock.release()
+        lock.close()
 
 
-def _marked_folder(parent: Path) -> tuple[Path, Lock]:
+def _marked_folder(parent: Path) -> tuple[Path, FileIO]:
     """A new folder that is marked as ours, and its mark, locked."""
     while True:
         folder = Path(tempfile.mkdtemp(prefix=PREFIX, dir=parent))
@@ -153,7 +154,7 @@ def clear_temporaries(parent: Path) -> None:
             try:
                 _settle(folder)
             finally:
-                lock.release()
+                lock.close()
 
 
 def _settle(folder: Path) -> None:

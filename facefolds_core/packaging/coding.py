@@ -15,9 +15,9 @@ from facefolds_core.asset.writer import LevelContent, write_level
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.packaging import rate
 from facefolds_core.packaging.attention import regions_of
-from facefolds_core.packaging.settings import LevelSetting
+from facefolds_core.packaging.settings import fitted
 from facefolds_core.packaging.views import FRAMES, ViewMeter
-from facefolds_core.params import CodecName, VideoCodec
+from facefolds_core.params import CodecName, CompressParams, VideoCodec
 from facefolds_core.spacing import spread
 
 
@@ -34,7 +34,7 @@ def coded_level(
     folder: Path,
     name: str,
     content: LevelContent,
-    setting: LevelSetting,
+    params: CompressParams,
     meter: ViewMeter | None,
     cameras: Sequence[Camera],
     shared: Level | None = None,
@@ -42,12 +42,13 @@ def coded_level(
     """Write a level and measure it: against the full one before coding, by `meter`.
 
     Args:
+        params: with the level's own values.
         cameras: that see it, for the bits of the meshes and of the video.
         shared: a level whose meshes are this one's, too.
     """
-    setting = setting.fitted(content.layers, cameras)
-    video, crfs, encoded = setting.video, dict[CodecName, int](), dict[CodecName, Path]()
-    regions = regions_of(content, cameras, setting.attention)
+    params = fitted(params, content.layers, cameras)
+    video, crfs, encoded = params.video, dict[CodecName, int](), dict[CodecName, Path]()
+    regions = regions_of(content, cameras, params.attention)
     with TemporaryDirectory(dir=folder) as scratch:  # a killed run leaves nothing elsewhere
         if meter is not None and video.target_psnr is not None:
             for codec in (CODECS[name] for name in video.codec):
@@ -55,7 +56,7 @@ def coded_level(
                 crfs[codec.name] = crf
                 if content.frames <= rate.FRAMES and not content.part_frames:
                     encoded[codec.name] = _trial(Path(scratch), codec, crf)
-        level = write_level(folder, name, content, setting, crfs or None, shared, regions, encoded)
+        level = write_level(folder, name, content, params, crfs or None, shared, regions, encoded)
     if meter is None:
         return level
     shown = read_level(folder, level)

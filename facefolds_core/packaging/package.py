@@ -8,19 +8,17 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
 from PIL import Image
 
 from facefolds_core.asset.audio import encode_sound
 from facefolds_core.asset.cropping import crop_layers
 from facefolds_core.asset.filmed import filmed_view
 from facefolds_core.asset.inputs import check_inputs
-from facefolds_core.asset.manifest import Level, Manifest
-from facefolds_core.asset.manifest_extras import Audio, FilmedView, Photo, Poster
+from facefolds_core.asset.manifest import Level, Manifest, Reflection
+from facefolds_core.asset.manifest_extras import Audio, Photo, Poster
 from facefolds_core.asset.manifest_file import MANIFEST_NAME, write_manifest
 from facefolds_core.asset.reader import read_level
-from facefolds_core.asset.reflection import ReflectionPicture, reflection_entry
+from facefolds_core.asset.reflection import pack_reflection
 from facefolds_core.asset.stored import stored_file
 from facefolds_core.asset.streams import make_streams
 from facefolds_core.asset.track_file import read_track
@@ -29,15 +27,15 @@ from facefolds_core.captures.scene import Scene
 from facefolds_core.errors import UserError
 from facefolds_core.files.frame_store import FrameStore
 from facefolds_core.files.writing import atomic_folder
+from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.geometry.reflections import ReflectionMaps
 from facefolds_core.geometry.sphere_uv import Window
 from facefolds_core.packaging.coding import coded_level, make_meter
-from facefolds_core.packaging.levels import coarse_content
+from facefolds_core.packaging.levels import coarse_content, is_streamed, stream_unit, write_rungs
 from facefolds_core.packaging.limits import Model, good_view
 from facefolds_core.packaging.poster import BACKGROUND, write_poster
-from facefolds_core.packaging.rungs import is_streamed, stream_unit, write_rungs
-from facefolds_core.packaging.settings import LevelSetting
+from facefolds_core.packaging.settings import level_params
 from facefolds_core.params import CompressParams, LevelParams
 from facefolds_core.spacing import spread
 
@@ -91,13 +89,13 @@ def package(folder: Path, export: Export, scene: Scene, params: CompressParams) 
         else:
             for coarse in params.levels:
                 content = coarse_content(full, export.windows, coarse, export.coarser[coarse.mesh_resolution])
-                coded = coded_level(temporary, coarse.name, content, LevelSetting.of(params, coarse), meter, cameras)
+                coded = coded_level(temporary, coarse.name, content, level_params(params, coarse), meter, cameras)
                 levels.append(coded)
-            level = coded_level(temporary, FULL, full, LevelSetting.of(params), meter, cameras)
+            level = coded_level(temporary, FULL, full, level_params(params), meter, cameras)
         if export.reflection is not None:
-            picture = ReflectionPicture.of(export.reflection)
-            levels = [_with_reflection(temporary, one, picture) for one in levels]
-            level = _with_reflection(temporary, level, picture)
+            packed = pack_reflection(export.reflection)
+            levels = [_with_reflection(temporary, one, *packed) for one in levels]
+            level = _with_reflection(temporary, level, *packed)
         photos = _photos(temporary, scene, params)
         manifest = _with_extras(temporary, manifest_of(source, [*levels, level], temporary), scene, photos)
         if streamed:
@@ -118,11 +116,11 @@ def _check_order(levels: Sequence[LevelParams]) -> None:
             )
 
 
-def _with_reflection(folder: Path, level: Level, picture: ReflectionPicture) -> Level:
+def _with_reflection(folder: Path, level: Level, png: bytes, said: dict[str, Any]) -> Level:
     """Add the reflection to a level; each has its own copy, a few kB: a level is complete in itself."""
     path = folder / f"{level.name}_reflection.png"
-    path.write_bytes(picture.png())
-    entry = reflection_entry(picture, stored_file(path).model_dump())
+    path.write_bytes(png)
+    entry = Reflection(**stored_file(path).model_dump(), **said)
     return level.model_copy(update={"reflection": entry, "bytes": level.bytes + entry.bytes})
 
 
@@ -136,27 +134,16 @@ def _with_extras(folder: Path, manifest: Manifest, scene: Scene, photos: Sequenc
     train = scene.indices("train")
     if train:
         unseen = [scene.cameras[index] for index in scene.indices("holdout")]
-        update["view"] = _with_good(folder, manifest, filmed_view([scene.cameras[index] for index in train], unseen))
+        view = filmed_view([scene.cameras[index] for index in train], unseen)
+        if view is not None:
+            level = read_level(folder, manifest.full, read_track(folder, manifest))
+            view = view.model_copy(update={"good": good_view(Model.of(level), view)})
+        update["view"] = view
     path, first = folder / "poster.jpg", scene.cameras[0]
     side = min(POSTER_SIDE, max(first.width, first.height))
     camera = write_poster(path, manifest, side, JPEG_QUALITY)
-    update["poster"] = Poster(
-        **stored_file(path).model_dump(),
-        width=camera.width,
-        height=camera.height,
-        K=_rows(camera.K),
-        w2c=_rows(camera.w2c),
-        background=BACKGROUND,
-    )
+    update["poster"] = Poster(**stored_file(path).model_dump(), **_taken_by(camera), background=BACKGROUND)
     return manifest.model_copy(update=update)
-
-
-def _with_good(folder: Path, manifest: Manifest, view: FilmedView | None) -> FilmedView | None:
-    """What was filmed, and from where the full level's picture is good."""
-    if view is None:
-        return None
-    level = read_level(folder, manifest.full, read_track(folder, manifest))
-    return view.model_copy(update={"good": good_view(Model.of(level), view)})
 
 
 def _photos(folder: Path, scene: Scene, params: CompressParams) -> list[Photo]:
@@ -169,19 +156,12 @@ def _photos(folder: Path, scene: Scene, params: CompressParams) -> list[Photo]:
         path = folder / f"photo_{index:02d}.jpg"
         Image.fromarray(store.image(*key)).save(path, quality=JPEG_QUALITY)
         camera = scene.cameras[key[0]]
-        found.append(
-            Photo(
-                **stored_file(path).model_dump(),
-                width=camera.width,
-                height=camera.height,
-                camera=camera.name,
-                frame=key[1],
-                K=_rows(camera.K),
-                w2c=_rows(camera.w2c),
-            )
-        )
+        stored = stored_file(path).model_dump()
+        found.append(Photo(**stored, **_taken_by(camera), camera=camera.name, frame=key[1]))
     return found
 
 
-def _rows(matrix: NDArray[np.float64]) -> Any:
-    return tuple(tuple(float(x) for x in row) for row in matrix)
+def _taken_by(camera: Camera) -> dict[str, Any]:
+    """What a manifest says of a picture's size and camera."""
+    K, w2c = (tuple(map(tuple, matrix.tolist())) for matrix in (camera.K, camera.w2c))
+    return {"width": camera.width, "height": camera.height, "K": K, "w2c": w2c}

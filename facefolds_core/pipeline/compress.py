@@ -9,7 +9,7 @@ from facefolds_core.asset.reader import read_level
 from facefolds_core.captures.scene import read_scene
 from facefolds_core.config.stages import read_stage
 from facefolds_core.export.steps import TEXTURES
-from facefolds_core.export.stores import read_chart, read_meshes, read_reflection_maps, read_windows
+from facefolds_core.export.stores import read_meshes, read_places
 from facefolds_core.files.frame_store import FrameStore
 from facefolds_core.files.paths import SubjectFolders
 from facefolds_core.packaging.notes import codec_warning
@@ -20,14 +20,17 @@ from facefolds_core.params import CompressParams
 def compress(folders: SubjectFolders) -> str:
     params = read_stage(CompressParams, folders.config)
     scene = read_scene(folders.scene)
-    grids, resolutions = folders.samples / "grids.npz", {level.mesh_resolution for level in params.levels}
+    windows, chart, reflection = read_places(folders.samples / "grids.npz")
     export = Export(
         meshes=read_meshes(folders.meshes / "meshes.npz"),
-        windows=read_windows(grids),
+        windows=windows,
         textures=FrameStore(folders.textures / TEXTURES),
-        centre=read_chart(grids).centre,
-        coarser={r: read_meshes(folders.meshes / f"level_{r}.npz") for r in resolutions},
-        reflection=read_reflection_maps(grids),
+        centre=chart.centre,
+        coarser={
+            r: read_meshes(folders.meshes / f"level_{r}.npz")
+            for r in {level.mesh_resolution for level in params.levels}
+        },
+        reflection=reflection,
     )
     manifest = package(folders.asset, export, scene, params)
     level = manifest.full

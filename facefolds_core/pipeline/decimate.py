@@ -5,7 +5,7 @@ from __future__ import annotations
 from facefolds_core.captures.scene import read_scene
 from facefolds_core.config.stages import read_level_resolutions, read_stage
 from facefolds_core.export import steps
-from facefolds_core.export.stores import holds_sheets, read_grids, read_sheets, read_surfaces, write_meshes
+from facefolds_core.export.stores import read_grids, read_surfaces, write_meshes
 from facefolds_core.files.paths import SubjectFolders
 from facefolds_core.files.writing import atomic_folder
 from facefolds_core.params import DecimateParams
@@ -14,8 +14,7 @@ from facefolds_core.pipeline.choices import write_choice
 
 def decimate(folders: SubjectFolders) -> str:
     params = read_stage(DecimateParams, folders.config)
-    path = folders.surfaces / "surfaces.npz"
-    surfaces = read_sheets(path) if holds_sheets(path) else read_surfaces(path)
+    surfaces = read_surfaces(folders.surfaces / "surfaces.npz")
     grids = read_grids(folders.samples / "grids.npz")
     levels = read_level_resolutions(folders.config)
     made = steps.decimate_all(

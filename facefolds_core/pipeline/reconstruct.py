@@ -5,7 +5,7 @@ from __future__ import annotations
 from facefolds_core.config.stages import read_stage
 from facefolds_core.export.poisson import reconstruct_layers
 from facefolds_core.export.sheets import grid_sheets
-from facefolds_core.export.stores import Grids, read_grids, write_sheets, write_surfaces
+from facefolds_core.export.stores import Grids, read_grids, write_meshes, write_sheets
 from facefolds_core.files.paths import SubjectFolders
 from facefolds_core.files.writing import atomic_folder
 from facefolds_core.params import ReconstructParams
@@ -29,6 +29,6 @@ def with_grid(grids: Grids, params: ReconstructParams, folders: SubjectFolders) 
 def with_poisson(grids: Grids, params: ReconstructParams, folders: SubjectFolders) -> str:
     surfaces = reconstruct_layers(grids, params)
     with atomic_folder(folders.surfaces) as temporary:
-        write_surfaces(temporary / "surfaces.npz", surfaces)
+        write_meshes(temporary / "surfaces.npz", surfaces)
     triangles = sum(len(surface.faces) for surface in surfaces)
     return f"{len(surfaces)} surfaces of {triangles} triangles; in {folders.surfaces}"

@@ -69,48 +69,29 @@ def gather(folders: SubjectFolders, player: Path | None) -> Subject:
     return Subject(facts, asset, scene, folders.evaluation, player)
 
 
-def now() -> str:
-    return datetime.now().astimezone().strftime("%Y-%m-%d %H:%M %Z")
-
-
 def render_page(subject: Subject, folder: str) -> str:
     """The page's HTML.
 
     Args:
         folder: the subject's name in commands: that of its folder.
     """
-    environment = page_environment()
-    files = {name: Markup(_source(environment, name)) for name in ("report.css", "report.js")}
-    return environment.get_template("report.html.j2").render(
-        css=files["report.css"], js=files["report.js"], folder=folder, **context(subject)
+    loader = PackageLoader("facefolds_core.reporting", "page")
+    environment = Environment(
+        loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
-
-
-def page_environment() -> Environment:
-    """For the templates in `page/`."""
-    return Environment(
-        loader=PackageLoader("facefolds_core.reporting", "page"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-
-
-def _source(environment: Environment, name: str) -> str:
-    assert environment.loader is not None
-    return environment.loader.get_source(environment, name)[0]
+    css, js = (Markup(loader.get_source(environment, name)[0]) for name in ("report.css", "report.js"))
+    return environment.get_template("report.html.j2").render(css=css, js=js, folder=folder, **context(subject))
 
 
 def context(subject: Subject) -> dict[str, Any]:
     """What the template prints, section by section; empty where there is nothing to show."""
     facts, manifest, scene = subject.facts, subject.asset.manifest, subject.scene
     key = headline(facts.metrics)
-    places = {camera.name: tables.place_of(camera) for camera in scene.cameras} if scene else {}
+    places = {camera.name: tables.degrees_from_front(camera) for camera in scene.cameras} if scene else {}
     poster, sheet = subject.asset.folder / "poster.jpg", subject.evaluation / "contact_sheet.png"
     return {
         "subject": facts.metrics.get("subject", manifest.subject),
-        "made": now(),
+        "made": datetime.now().astimezone().strftime("%Y-%m-%d %H:%M %Z"),
         "face": face(subject.asset, subject.player),
         "poster": pictures.stored(poster) if poster.is_file() else None,
         "generator": manifest.generator,
@@ -180,7 +161,7 @@ def worst(subject: Subject) -> dict[str, str] | None:
 def films(subject: Subject) -> dict[str, Any]:
     """Films of the held-out cameras, as many as the page has room for."""
     scene = subject.scene
-    places = {camera.name: tables.place_of(camera).angle for camera in scene.cameras} if scene else {}
+    places = {camera.name: tables.degrees_from_front(camera) for camera in scene.cameras} if scene else {}
     kept, left, room = list[dict[str, Any]](), 0, MOST_FILM_BYTES
     for film in sorted(read_films(subject.evaluation), key=lambda one: places.get(one.camera, 0.0)):
         path = subject.evaluation / film.file

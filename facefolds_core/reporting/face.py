@@ -8,7 +8,7 @@ from typing import Any
 
 from facefolds_core.asset.manifest import Level
 from facefolds_core.asset.reader import Asset
-from facefolds_core.asset.single_page import write_single_page
+from facefolds_core.asset.single_page import shipped, write_single_page
 
 MOST_FACE_BYTES = 6_000_000
 """Of the files of the level that is embedded: in the page they are a third larger."""
@@ -30,10 +30,6 @@ def face(asset: Asset, player: Path | None) -> dict[str, Any] | None:
 
 
 def embedded(asset: Asset) -> Level | None:
-    """The finest level whose files are few bytes enough; of its videos one is shipped."""
-    fitting = [level for level in asset.manifest.levels if _bytes(level) <= MOST_FACE_BYTES]
-    return fitting[-1] if fitting else None
-
-
-def _bytes(level: Level) -> int:
-    return level.bytes - sum(video.bytes for video in level.texture.videos[1:])
+    """The finest level whose files are few bytes enough."""
+    levels = reversed(asset.manifest.levels)
+    return next((one for one in levels if shipped(asset.manifest, one).full.bytes <= MOST_FACE_BYTES), None)

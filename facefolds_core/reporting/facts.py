@@ -13,26 +13,11 @@ import pyarrow.parquet as pq
 
 from facefolds_core.errors import UserError
 from facefolds_core.files.paths import SubjectFolders
-from facefolds_core.files.reading import check_regular, is_there, no_memory
+from facefolds_core.files.reading import STAGE_OUTPUTS, check_regular, is_there, no_memory
 from facefolds_core.files.writing import read_json
 from facefolds_core.scoring.panels import HEADLINES
 
 REMEDY = "make it with `dvc repro` (on a fresh machine: `make repro`)"
-
-STAGE_OUTPUTS: dict[str, tuple[str, ...]] = {
-    "capture": ("capture",),
-    "normalize": ("scene",),
-    "subject": ("subject",),
-    "train": ("model", "training"),
-    "sample": ("samples",),
-    "reconstruct": ("surfaces",),
-    "decimate": ("meshes",),
-    "texture": ("resampled",),
-    "bake": ("textures",),
-    "compress": ("asset", "asset.glb"),
-    "evaluate": ("evaluation", "metrics.json"),
-}
-"""What each stage leaves in data/<subject>, in the order in which they run."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +44,6 @@ class Facts:
     Attributes:
         metrics: metrics.json.
         images: scores of the asset on each held-out image; empty without evaluation/per_image.parquet.
-        training: model/training.json.
         fit: model/fit.json, of presets that fit the scene first.
         curves: the training log.
         stages: seconds and bytes of each, in the order in which they run.
@@ -68,7 +52,6 @@ class Facts:
 
     metrics: dict[str, Any]
     images: tuple[ImageScores, ...]
-    training: dict[str, Any] | None
     fit: dict[str, Any] | None
     curves: dict[str, list[tuple[float, float]]]
     stages: dict[str, tuple[float | None, int | None]]
@@ -93,7 +76,6 @@ def read_facts(folders: SubjectFolders) -> Facts:
     return Facts(
         metrics=metrics,
         images=read_images(folders.evaluation / "per_image.parquet"),
-        training=read_mapping(folders.model / "training.json"),
         fit=read_mapping(folders.model / "fit.json"),
         curves=read_curves(folders.training_log / "plots" / "metrics"),
         stages={name: (seconds_of(folders, name), bytes_of(folders, name)) for name in STAGE_OUTPUTS},

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from facefolds_core.asset.manifest import Manifest
+from facefolds_core.files.reading import STAGE_OUTPUTS
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.reporting.charts import heat_colour, ink_on
-from facefolds_core.reporting.facts import STAGE_OUTPUTS, ImageScores, finite
+from facefolds_core.reporting.facts import ImageScores, finite
 from facefolds_core.reporting.words import count, duration, number, size
 from facefolds_core.scoring.panels import VARIANTS
 
@@ -29,19 +29,10 @@ HEAT_RANGE = 3.0
 """dB: the heat map's colours span at least so many, so that next to nothing does not look like much."""
 
 
-@dataclass(frozen=True)
-class Place:
-    """Of a camera seen from the subject, degrees: `azimuth` to its left, `elevation` upwards, `angle` from front."""
-
-    azimuth: float
-    elevation: float
-    angle: float
-
-
-def place_of(camera: Camera) -> Place:
-    x, y, z = (camera.centre / np.linalg.norm(camera.centre)).tolist()
-    angle = math.degrees(math.acos(max(-1.0, min(1.0, x))))
-    return Place(math.degrees(math.atan2(y, x)), math.degrees(math.asin(max(-1.0, min(1.0, z)))), angle)
+def degrees_from_front(camera: Camera) -> float:
+    """Of a camera as seen from the subject, which looks to +x."""
+    cosine = float(camera.centre[0] / np.linalg.norm(camera.centre))
+    return math.degrees(math.acos(max(-1.0, min(1.0, cosine))))
 
 
 def share(value: float | None, most: float) -> float:
@@ -93,7 +84,7 @@ def scores(metrics: dict[str, Any]) -> dict[str, Any]:
     return {"groups": groups, "names": names, "rows": rows}
 
 
-def heat_map(images: Sequence[ImageScores], key: str, places: dict[str, Place]) -> Row:
+def heat_map(images: Sequence[ImageScores], key: str, places: dict[str, float]) -> Row:
     """PSNR of every held-out camera and frame."""
     values = {(image.camera, image.frame): getattr(image, key) for image in images}
     known = [value for value in values.values() if value is not None]
@@ -114,8 +105,7 @@ def heat_map(images: Sequence[ImageScores], key: str, places: dict[str, Place]) 
                     "ink": None if where is None else ink_on(where),
                 }
             )
-        place = places.get(camera)
-        note = f"{place.angle:.0f}° from front" if place else ""
+        note = f"{places[camera]:.0f}° from front" if camera in places else ""
         rows.append({"camera": camera, "note": note, "mean": number(np.mean(own) if own else None), "cells": cells})
     stops = ", ".join(heat_colour(i / 8) for i in range(9))
     return {

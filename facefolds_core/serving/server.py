@@ -13,6 +13,7 @@ import threading
 from collections.abc import Awaitable, Callable, Iterator, Mapping
 from concurrent.futures import Future
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 
 from aiohttp import web
@@ -124,7 +125,9 @@ def serving(player: Path, assets: Mapping[str, Path], port: int = 0) -> Iterator
         try:
             runner, own = loop.run_until_complete(_start(player, assets, port))
         except BaseException as error:  # whatever it is, the caller waits for it
-            address.set_exception(_port_error(error, port) if isinstance(error, OSError) else error)
+            remedy = "choose another one with --port, or leave it out for any free one"
+            taken = partial(UserError, "cannot listen on the port", place=f"{HOST}:{port}", remedy=remedy)
+            address.set_exception(taken(found=error.strerror) if isinstance(error, OSError) else error)
             return
         address.set_result(f"http://{HOST}:{own}/")
         loop.run_forever()
@@ -140,12 +143,3 @@ def serving(player: Path, assets: Mapping[str, Path], port: int = 0) -> Iterator
             loop.call_soon_threadsafe(loop.stop)
         thread.join()
         loop.close()
-
-
-def _port_error(error: OSError, port: int) -> UserError:
-    return UserError(
-        "cannot listen on the port",
-        place=f"{HOST}:{port}",
-        found=error.strerror,
-        remedy="choose another one with --port, or leave it out for any free one",
-    )

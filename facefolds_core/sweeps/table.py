@@ -73,7 +73,9 @@ def write_runs(path: Path, runs: Sequence[Run]) -> None:
     Raises:
         UserError: if it names none.
     """
-    _check_suffix(path)
+    if path.suffix not in SUFFIXES:
+        expected, found = " or ".join(SUFFIXES), path.suffix or "none"
+        raise UserError("an unknown kind of table", file=path, expected=expected, found=found)
     columns: dict[str, pa.Array] = {name: pa.array([getattr(run, name) for run in runs], pa.string()) for name in NAMES}
     for name in _union(run.params for run in runs):
         # A null that somebody set is a value; a cell is only empty where the run lacks the key.
@@ -103,10 +105,3 @@ def _numbers(values: list[Any]) -> pa.Array | None:
     if any(isinstance(value, bool) or not isinstance(value, (int, float)) for value in known):
         return None
     return pa.array(values, pa.int64() if all(isinstance(value, int) for value in known) else pa.float64())
-
-
-def _check_suffix(path: Path) -> None:
-    if path.suffix not in SUFFIXES:
-        raise UserError(
-            "an unknown kind of table", file=path, expected=" or ".join(SUFFIXES), found=path.suffix or "none"
-        )

@@ -7,7 +7,7 @@ import os
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from io import FileIO
 from pathlib import Path
 
 try:
@@ -21,22 +21,10 @@ WAIT = 0.1
 _HELD = (errno.EWOULDBLOCK, errno.EAGAIN, errno.EACCES)
 
 
-@dataclass(frozen=True)
-class Lock:
-    """A lock file that this process holds until `release`, or until it ends.
+def try_lock(path: Path, create: bool = True) -> FileIO | None:
+    """Lock a file until what is returned is closed, or this process ends; None if another one holds it.
 
-    Attributes:
-        handle: of the open file.
-    """
-
-    handle: int
-
-    def release(self) -> None:
-        os.close(self.handle)
-
-
-def try_lock(path: Path, create: bool = True) -> Lock | None:
-    """Lock a file; None if another process holds it. Its content is left alone.
+    Its content is left alone.
 
     On file systems that know no locks the answer is a lock that keeps nobody out.
 
@@ -51,7 +39,7 @@ def try_lock(path: Path, create: bool = True) -> Lock | None:
         if error.errno in _HELD:
             os.close(handle)
             return None
-    return Lock(handle)
+    return FileIO(handle, "r+")
 
 
 @contextmanager
@@ -70,11 +58,11 @@ def holding(path: Path, seconds: float) -> Iterator[bool]:
         yield False
         return
     try:
-        os.truncate(lock.handle, 0)
-        os.write(lock.handle, f"{os.getpid()}\n".encode())
+        lock.truncate(0)
+        lock.write(f"{os.getpid()}\n".encode())
         yield True
     finally:
-        lock.release()
+        lock.close()
 
 
 def owner(path: Path) -> str:

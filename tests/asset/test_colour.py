@@ -37,20 +37,6 @@ def test_uniform_colours_come_back() -> None:
     assert worst <= 3  # half a code of chroma times 1.8556 * 255 / 224, and half a code of luma; 2 seen
 
 
-def ramp() -> np.ndarray:
-    """(64, 64, 3) in [0, 1], a hue that changes across and down: linear chroma, constant luma."""
-    columns, rows = np.meshgrid(np.arange(64), np.arange(64))
-    cr = (columns + 2 * rows) / 64 * 0.1
-    return np.stack([0.5 + 1.5748 * cr, 0.5 - 0.2126 * 1.5748 / 0.7152 * cr, np.full(cr.shape, 0.5)], -1)
-
-
-def test_chroma_lies_between_columns_and_rows() -> None:
-    # It must come back from its own siting (inner pixels).
-    image = np.rint(255 * ramp()).astype(np.uint8)
-    error = yuv420_to_rgb(*rgb_to_yuv420(image)).astype(float)[2:-2, 2:-2] - 255 * ramp()[2:-2, 2:-2]
-    assert abs(error[..., 0].mean()) < 0.1  # sited left, red would be off by 0.31
-
-
 def test_chroma_is_read_by_a_linear_look_up_as_graphics_cards_do_it() -> None:
     # OpenGL's GL_LINEAR with GL_CLAMP_TO_EDGE in a plane of half the size, at luma's own coordinate.
     cr = np.random.default_rng(0).integers(100, 156, (8, 12)).astype(np.uint8)
@@ -59,14 +45,6 @@ def test_chroma_is_read_by_a_linear_look_up_as_graphics_cards_do_it() -> None:
     grey, neutral = np.full((16, 24), 126, np.uint8), np.full(cr.shape, 128, np.uint8)
     red = 255 * ((126 - 16) / 219 + 1.5748 * (expected - 128) / 224)
     assert np.abs(yuv420_to_rgb(grey, neutral, cr)[..., 0] - red).max() <= 0.51
-
-
-def test_fine_texture_keeps_48_db() -> None:
-    y, x = np.mgrid[:256, :256] / 256
-    waves = [0.5 + 0.4 * np.sin(20 * x + 9 * y), 0.45 + 0.3 * np.cos(33 * y + 30 * x), 0.4 + 0.3 * np.sin(25 * (x - y))]
-    image = np.rint(255 * np.stack(waves, -1)).astype(np.uint8)
-    error = yuv420_to_rgb(*rgb_to_yuv420(image)).astype(float) - image
-    assert 10 * np.log10(255**2 / (error**2).mean()) > 48  # 48.7 seen
 
 
 @pytest.mark.parametrize("height", [2, 4, 12])

@@ -9,31 +9,12 @@ from facefolds_core.asset.cropping import ALPHA_BOUND, crop_layers
 from facefolds_core.errors import UserError
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.geometry.sphere_uv import st_to_uv
-from facefolds_core.rendering.reference import AssetCaster, composite
-from tests.assets import CENTRE, WINDOW, cap_mesh
+from facefolds_core.rendering.raster import cast_layers
+from facefolds_core.rendering.reference import composite
+from tests.assets import CENTRE, WINDOW, Store, cap_mesh
 from tests.scenes import look_at_origin
 
 SIZE = 48
-
-
-class Store:
-    """Textures (K, N, R, R, 4)."""
-
-    def __init__(self, frames: np.ndarray) -> None:
-        self.frames = frames
-
-    def image(self, layer: int, frame: int, /) -> np.ndarray:
-        return np.asarray(self.frames[frame, layer])
-
-
-class Shown:
-    """What the caster needs."""
-
-    def __init__(self, layers: list[TexturedMesh]) -> None:
-        self.layers = layers
-
-    def frame(self, k: int, /) -> list[np.ndarray]:
-        raise NotImplementedError
 
 
 def patches(boxes: list[tuple[int, int, int, int]], alpha: int = 200) -> np.ndarray:
@@ -51,9 +32,9 @@ def test_rendering_is_unchanged() -> None:
     crops = crop_layers(meshes, [WINDOW] * 3, Store(frames), 1)
     assert all(len(crop.mesh.faces) < len(meshes[0].faces) for crop in crops)
     camera = look_at_origin("front", 5, 5, 64)
-    before = composite(AssetCaster(Shown(meshes)).cast(camera), list(frames[0]))
+    before = composite(cast_layers(camera, meshes), list(frames[0]))
     textures = [crop.cut(frames[0, crop.source]) for crop in crops]
-    after = composite(AssetCaster(Shown([crop.mesh for crop in crops])).cast(camera), textures)
+    after = composite(cast_layers(camera, [crop.mesh for crop in crops]), textures)
     assert before[1].max() > 0.5
     for a, b in zip(before, after, strict=True):
         np.testing.assert_allclose(a, b, atol=1e-5)
@@ -75,9 +56,9 @@ def test_no_hole_in_a_clear_front_lets_the_back_of_its_layer_through() -> None:
     crops = crop_layers(meshes, [WINDOW] * 2, Store(frames), 1)
     cameras = [look_at_origin("c", azimuth, 5, 48) for azimuth in (-60, -20, 0, 35, 80)]
     for camera in cameras:
-        before = composite(AssetCaster(Shown(meshes)).cast(camera), list(frames[0]))
+        before = composite(cast_layers(camera, meshes), list(frames[0]))
         textures = [crop.cut(frames[0, crop.source]) for crop in crops]
-        after = composite(AssetCaster(Shown([crop.mesh for crop in crops])).cast(camera), textures)
+        after = composite(cast_layers(camera, [crop.mesh for crop in crops]), textures)
         np.testing.assert_allclose(before[0], after[0], atol=1e-5)
 
 

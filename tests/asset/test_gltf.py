@@ -6,7 +6,6 @@ import hashlib
 import io
 import json
 import re
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -22,12 +21,10 @@ from facefolds_core.asset.gltf.checking import check_glb
 from facefolds_core.asset.gltf.extension import NAME, SCHEMA, LayeredVideo, schema, write_schema
 from facefolds_core.asset.gltf.writing import write_layered
 from facefolds_core.cli.export import export
-from facefolds_core.geometry.track import Track
 from facefolds_core.params import CompressParams, MeshCodec
-from tests.assets import SOURCE, make_asset
-from tests.geometry.test_track import SHIFTS, TURNS
+from tests.assets import TRACK
 from tests.gltf_files import complaints, opened, part, validator_report
-from tests.viewer.fixtures import add_reflection, change_manifest, file_entry, rich_asset
+from tests.viewer.fixtures import change_manifest, file_entry, moving_asset
 
 HOME = Path(__file__).parents[2] / "docs" / "reference" / NAME
 FRAMES = 3
@@ -36,12 +33,8 @@ FRAMES = 3
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """An asset with all that the extension says: a track and a reflection."""
-    folder = tmp_path_factory.mktemp("gltf") / "asset"
     params = CompressParams(mesh=MeshCodec(quantization_bits=14, compression_level=7))
-    source = replace(SOURCE, track=Track.of(TURNS, SHIFTS))
-    make_asset(folder, layers=3, frames=FRAMES, params=params, source=source)
-    add_reflection(folder)
-    return folder
+    return moving_asset(tmp_path_factory.mktemp("gltf") / "asset", params=params).folder
 
 
 @pytest.fixture(scope="module")
@@ -127,8 +120,7 @@ def test_layers_are_the_assets_meshes(folder: Path, written: tuple[dict[str, Any
 def test_the_animation_is_the_track(written: tuple[dict[str, Any], bytes]) -> None:
     document, binary = written
     one = document["animations"][0]
-    track = Track.of(TURNS, SHIFTS)
-    wanted = {"rotation": track.quaternions[:, [1, 2, 3, 0]], "translation": track.translations}
+    wanted = {"rotation": TRACK.quaternions[:, [1, 2, 3, 0]], "translation": TRACK.translations}
     for channel in one["channels"]:
         sampler, path = one["samplers"][channel["sampler"]], channel["target"]["path"]
         views = [document["accessors"][sampler[end]]["bufferView"] for end in ("input", "output")]
@@ -145,8 +137,7 @@ def test_the_command_writes_it(folder: Path, tmp_path: Path) -> None:
     assert said(opened(tmp_path / "face.glb")[0])["stillFrame"] == 0
 
 
-def test_the_still_is_of_the_coarsest_level(tmp_path: Path) -> None:
-    rich = rich_asset(tmp_path / "asset")
+def test_the_still_is_of_the_coarsest_level(rich: Path, tmp_path: Path) -> None:
     export("gltf", rich, tmp_path / "face.glb", None)
     document, _ = opened(tmp_path / "face.glb")
     coarse, full = read_asset(rich).levels
@@ -173,9 +164,9 @@ def packets(data: bytes, kind: str) -> list[tuple[bytes, float]]:
 
 
 @pytest.mark.parametrize("encoded", [False, True])
-def test_the_sound_lies_in_the_video(tmp_path: Path, encoded: bool) -> None:
+def test_the_sound_lies_in_the_video(rich_copy: Path, tmp_path: Path, encoded: bool) -> None:
     """The pictures stay as they are, and so does sound that is AAC already."""
-    rich = rich_asset(tmp_path / "asset")
+    rich = rich_copy
     if encoded:
         encode_sound(rich / "sound.mp4", rich / "audio.wav", 0.2)
         change_manifest(rich, lambda value: value.update(audio=file_entry(rich / "sound.mp4") | {"mime": AAC_MIME}))

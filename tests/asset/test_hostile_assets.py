@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import os
 import shutil
 import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -19,35 +17,21 @@ from facefolds_core.asset import read_asset
 from facefolds_core.asset.checks import mesh_problems
 from facefolds_core.asset.draco import DracoError, decode_mesh
 from facefolds_core.asset.manifest_file import parse_manifest
-from facefolds_core.asset.nesting import lies_within
 from facefolds_core.asset.reader import read_level
-from facefolds_core.asset.validation import validate_asset
+from facefolds_core.asset.validation import lies_within, validate_asset
 from facefolds_core.errors import UserError
 from facefolds_core.geometry.meshes import TexturedMesh
 from tests.asset.filmed import filmed, packaged
 from tests.assets import CENTRE, cap_mesh
-from tests.hostile.fuzz_assets import seal
-from tests.viewer.fixtures import rich_asset
+from tests.hostile.fuzz_assets import edit, put
+from tests.viewer.fixtures import file_entry
 
 Value = dict[str, Any]
 
 
-@pytest.fixture(scope="module")
-def sound(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return rich_asset(tmp_path_factory.mktemp("sound") / "asset")
-
-
 @pytest.fixture
-def asset(sound: Path, tmp_path: Path) -> Path:
-    """A copy to damage."""
-    return Path(shutil.copytree(sound, tmp_path / "asset"))
-
-
-def edit(folder: Path, change: Callable[[Value], object]) -> None:
-    """Change the manifest as JSON, and seal it again."""
-    value = json.loads((folder / "manifest.json").read_text())
-    change(value)
-    seal(folder, value)
+def asset(rich_copy: Path) -> Path:
+    return rich_copy
 
 
 def refused(folder: Path, word: str) -> None:
@@ -55,15 +39,6 @@ def refused(folder: Path, word: str) -> None:
     assert any(word in problem for problem in problems), problems
     with pytest.raises(UserError):
         read_asset(folder)
-
-
-def put(*keys: str | int, to: object) -> Callable[[Value], None]:
-    def change(value: Any) -> None:
-        for key in keys[:-1]:
-            value = value[key]
-        value[keys[-1]] = to
-
-    return change
 
 
 LAYER, TEXTURE, PLACE = ("levels", 0, "layers", 0), ("levels", 0, "texture"), ("coordinates", "to_capture")
@@ -202,8 +177,7 @@ def test_strays_are_counted_not_listed_without_end(asset: Path) -> None:
 
 def test_a_picture_larger_than_said_is_not_decoded(asset: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     Image.new("RGB", (4000, 4000)).save(asset / "poster.png")
-    data = (asset / "poster.png").read_bytes()
-    edit(asset, lambda value: value["poster"].update(bytes=len(data), sha256=hashlib.sha256(data).hexdigest()))
+    edit(asset, lambda value: value["poster"].update(file_entry(asset / "poster.png")))
     decoded = []
     monkeypatch.setattr("PIL.ImageFile.ImageFile.load", lambda self: decoded.append(self.size))
     problems = [problem for problem in validate_asset(asset) if problem.startswith("poster.png")]
@@ -217,9 +191,8 @@ def test_a_picture_beyond_pillows_limit_is_no_traceback(asset: Path, monkeypatch
 
 
 def test_a_sound_that_is_none(asset: Path) -> None:
-    data = b"#EXTM3U\n/etc/passwd\n"
-    (asset / "audio.wav").write_bytes(data)
-    edit(asset, lambda value: value["audio"].update(bytes=len(data), sha256=hashlib.sha256(data).hexdigest()))
+    (asset / "audio.wav").write_bytes(b"#EXTM3U\n/etc/passwd\n")
+    edit(asset, lambda value: value["audio"].update(file_entry(asset / "audio.wav")))
     assert [problem[:22] for problem in validate_asset(asset)] == ["audio.wav: not a sound"]
 
 

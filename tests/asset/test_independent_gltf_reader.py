@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from facefolds_core.asset import Asset, read_asset
+from facefolds_core.asset import Asset
 from facefolds_core.asset.gltf.writing import write_layered
-from facefolds_core.geometry.track import Track
 from facefolds_core.rendering.pixels import render
 from tests.asset.independent_gltf_reader import Face
-from tests.assets import SOURCE, make_asset
-from tests.geometry.test_track import SHIFTS, TURNS
 from tests.pictures import GREY_VALUE, five_cameras, psnr
-from tests.viewer.fixtures import add_reflection
+from tests.viewer.fixtures import moving_asset
 
 pytestmark = pytest.mark.slow
 
@@ -27,11 +23,9 @@ AGREE = 45.0
 
 @pytest.fixture(scope="module")
 def asset(tmp_path_factory: pytest.TempPathFactory) -> Asset:
-    folder = tmp_path_factory.mktemp("face") / "asset"
-    make_asset(folder, layers=3, frames=3, source=replace(SOURCE, track=Track.of(TURNS, SHIFTS)))
-    add_reflection(folder)
-    write_layered(folder.with_suffix(".glb"), read_asset(folder).full, "caps")
-    return read_asset(folder)
+    made = moving_asset(tmp_path_factory.mktemp("face") / "asset", layers=3)
+    write_layered(made.folder.with_suffix(".glb"), made.full, "caps")
+    return made
 
 
 def test_five_views_agree_with_the_reference(asset: Asset) -> None:

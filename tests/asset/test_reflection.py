@@ -10,9 +10,9 @@ import pytest
 import torch
 
 from facefolds_core.asset import Asset, read_asset
-from facefolds_core.asset.reflection import ReflectionPicture
+from facefolds_core.asset.reflection import pack_reflection
 from facefolds_core.asset.validation import validate_asset
-from facefolds_core.export.stores import read_reflection_maps
+from facefolds_core.export.stores import read_places
 from facefolds_core.geometry.sphere_uv import st_to_uv, uv_to_st
 from facefolds_core.model.reflection import Reflection, ReflectionShape
 from facefolds_core.rendering import AssetCaster
@@ -84,18 +84,15 @@ def test_a_rectangle_beside_the_picture_is_refused(made: Path, tmp_path: Path) -
 def test_an_empty_reflection_can_be_stored() -> None:
     maps = random_reflection()
     blank = type(maps)(**{**vars(maps), "gloss": 0 * maps.gloss, "environment": 0 * maps.environment})
-    assert all(scale > 0 for scale in ReflectionPicture.of(blank).scales)
+    assert all(value > 0 for key, value in pack_reflection(blank)[1].items() if key.endswith("_scale"))
 
 
-def test_grids_without_a_reflection_say_so(tmp_path: Path) -> None:
-    np.savez(tmp_path / "grids.npz", windows=np.zeros((1, 4)))
-    assert read_reflection_maps(tmp_path / "grids.npz") is None
-
-
-def test_grids_keep_the_reflection(tmp_path: Path) -> None:
-    maps = random_reflection()
-    np.savez(tmp_path / "grids.npz", **{f"reflection_{name}": np.asarray(value) for name, value in vars(maps).items()})
-    found = read_reflection_maps(tmp_path / "grids.npz")
-    assert found is not None
-    assert found.window == maps.window
+def test_grids_keep_the_reflection_where_there_is_one(tmp_path: Path) -> None:
+    path, maps = tmp_path / "grids.npz", random_reflection()
+    places = {"windows": np.array([[-1.0, 1, -1, 1]]), "centre": np.zeros(3)}
+    np.savez(path, **places)
+    assert read_places(path)[2] is None
+    np.savez(path, **places, **{f"reflection_{name}": np.asarray(value) for name, value in vars(maps).items()})
+    found = read_places(path)[2]
+    assert found is not None and found.window == maps.window
     np.testing.assert_array_equal(found.environment, maps.environment)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable
@@ -19,7 +18,7 @@ from facefolds_core.asset.packing import AtlasLayout
 from facefolds_core.asset.validation import validate_asset
 from facefolds_core.errors import UserError
 from tests.assets import make_asset
-from tests.hostile.fuzz_assets import seal
+from tests.hostile.fuzz_assets import edit
 from tests.streamed import streamed_asset
 
 SECTION = {
@@ -72,8 +71,7 @@ def test_levels_that_are_switched_share_meshes_and_places(whole: Path) -> None:
 
 
 def test_frames_are_those_of_the_same_take_in_one_piece(whole: Path, tmp_path: Path) -> None:
-    make_asset(tmp_path / "plain", layers=2, frames=FRAMES)
-    plain, stream = read_asset(tmp_path / "plain"), read_asset(whole)
+    plain, stream = make_asset(tmp_path / "plain", layers=2, frames=FRAMES), read_asset(whole)
     assert sum(1 for _ in stream.frames()) == FRAMES
     for index in (0, 5, 6, 13):
         for a, b in zip(plain.frame(index), stream.frame(index), strict=True):
@@ -146,9 +144,7 @@ WRONG: dict[str, tuple[Callable[[Value], Any], str]] = {
 @pytest.mark.parametrize("what", WRONG)
 def test_segments_that_cannot_be(asset: Path, what: str) -> None:
     change, word = WRONG[what]
-    value = json.loads((asset / "manifest.json").read_text())
-    change(value)
-    seal(asset, value)
+    edit(asset, change)
     assert any(word in problem for problem in validate_asset(asset)), validate_asset(asset)
     with pytest.raises(UserError, match="damaged manifest"):
         read_asset(asset)

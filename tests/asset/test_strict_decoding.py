@@ -152,8 +152,10 @@ def test_a_sound_is_decoded(tmp_path: Path, mp4: Path) -> None:
     assert sound_problem(path, 1.0)
 
 
-def test_containers_without_streams(tmp_path: Path) -> None:
+def test_what_is_no_video_and_containers_without_streams(tmp_path: Path) -> None:
     for name, content in {
+        "empty.mp4": b"",
+        "text.mp4": b"not a video" * 100,
         "a.mp4": struct.pack(">I4s4s4xI4s", 16, b"ftyp", b"isom", 8, b"moov"),
         "a.webm": b"\x1a\x45\xdf\xa3\x87\x42\x82\x84webm\x18\x53\x80\x67\x80",
     }.items():

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import shutil
 from dataclasses import replace
@@ -17,22 +16,18 @@ from facefolds_core.asset.glb import write_glb
 from facefolds_core.asset.manifest_file import SCHEMA_PATH
 from facefolds_core.asset.validation import validate_asset
 from facefolds_core.errors import UserError
-from facefolds_core.geometry.track import Track
 from facefolds_core.rendering import render_asset
-from tests.assets import SOURCE, make_asset
-from tests.geometry.test_track import SHIFTS, TURNS
+from tests.assets import MOVING, TRACK, make_asset
+from tests.geometry.test_track import SHIFTS
 from tests.gltf_files import opened
-from tests.hostile.fuzz_assets import seal
+from tests.hostile.fuzz_assets import edit, put
 from tests.scenes import look_at_origin
-
-TRACK = Track.of(TURNS, SHIFTS)
+from tests.viewer.fixtures import file_entry
 
 
 @pytest.fixture(scope="module")
 def asset(tmp_path_factory: pytest.TempPathFactory) -> Asset:
-    folder = tmp_path_factory.mktemp("track") / "asset"
-    make_asset(folder, layers=2, frames=3, resolution=32, source=replace(SOURCE, track=TRACK))
-    return read_asset(folder)
+    return make_asset(tmp_path_factory.mktemp("track") / "asset", layers=2, frames=3, resolution=32, source=MOVING)
 
 
 def test_the_track_comes_back_from_its_file(asset: Asset) -> None:
@@ -72,9 +67,7 @@ def test_a_wrong_track_is_a_problem(asset: Asset, row: list[float] | None, says:
     folder = Path(shutil.copytree(asset.folder, tmp_path / "asset"))
     poses = POSES[:2] if row is None else np.array([*POSES[:2], row], "<f4")
     (folder / "track.bin").write_bytes(poses.tobytes())
-    value = json.loads((folder / "manifest.json").read_text())
-    entry = {"file": "track.bin", "bytes": poses.nbytes, "sha256": hashlib.sha256(poses.tobytes()).hexdigest()}
-    seal(folder, value | {"track_file": entry})
+    edit(folder, put("track_file", to=file_entry(folder / "track.bin")))
     (found,) = validate_asset(folder)
     assert says in found
     with pytest.raises(UserError, match=says):
@@ -93,7 +86,7 @@ def test_a_damaged_track_is_refused(asset: Asset, tmp_path: Path) -> None:
 def test_a_picture_shows_the_head_where_it_stood(asset: Asset) -> None:
     """As the camera that moved against it would see a head that stands still."""
     camera = look_at_origin("side", 25, 10, 24)
-    still = replace(asset, levels=tuple(replace(level, track=None) for level in asset.levels))
+    still = replace(asset, track=None)
     assert asset.track is not None
     moved, _ = render_asset(asset, camera, 2)
     expected, _ = render_asset(still, camera.transformed(asset.track.at(2).inverse()), 2)

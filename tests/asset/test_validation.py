@@ -1,9 +1,8 @@
-"""The validator finds what is wrong behind the checksums (damage: test_damage), and says so on the command line."""
+"""The validator names what is wrong, by damage or behind right checksums, the reader refuses it; and the command."""
 
 from __future__ import annotations
 
 import hashlib
-import json
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -15,26 +14,16 @@ import pytest
 from typer.testing import CliRunner
 
 from facefolds_core.asset import read_asset
-from facefolds_core.asset.manifest import Manifest
-from facefolds_core.asset.manifest_file import write_manifest
 from facefolds_core.asset.validation import validate_asset
 from facefolds_core.cli import app
 from facefolds_core.errors import UserError
-from facefolds_core.files.writing import file_sha256
-from tests.assets import cap_mesh, make_asset
+from tests.assets import cap_mesh
+from tests.hostile.damage import flip_bits
+from tests.hostile.fuzz_assets import edit, put
+from tests.viewer.fixtures import change_manifest, file_entry
 
-
-@pytest.fixture(scope="module")
-def sound(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("sound") / "asset"
-    make_asset(folder, layers=2, frames=3)
-    return folder
-
-
-@pytest.fixture
-def asset(sound: Path, tmp_path: Path) -> Path:
-    """A copy to damage."""
-    return Path(shutil.copytree(sound, tmp_path / "asset"))
+READ = ("manifest.json", "full_meshes.bin", "full.mp4")
+"""Of these the reader wants to know at once whether they are whole."""
 
 
 def assert_found(folder: Path, file: str, word: str = "") -> None:
@@ -45,113 +34,94 @@ def assert_found(folder: Path, file: str, word: str = "") -> None:
         list(read_asset(folder).frames())
 
 
-def edit(folder: Path, change: Callable[[dict[str, Any]], None]) -> None:
-    """Change the manifest's content; its own checksum is made anew."""
-    value = json.loads((folder / "manifest.json").read_text())
-    change(value)
-    write_manifest(Manifest.model_validate_json(json.dumps(value)), folder / "manifest.json")
+def test_damage_of_any_file_is_named(rich: Path, tmp_path: Path) -> None:
+    assert validate_asset(rich) == []
+    for path in sorted(rich.iterdir()):
+        folder = Path(shutil.copytree(rich, tmp_path / path.name))
+        data = path.read_bytes()
+        flipped = flip_bits(data, np.random.default_rng(len(path.name)))
+        for what, damaged in {
+            "truncated": data[: len(data) // 2],
+            "a byte short": data[:-1],
+            "flipped": flipped,
+        }.items():
+            (folder / path.name).write_bytes(damaged)
+            assert any(problem.startswith(f"{path.name}:") for problem in validate_asset(folder)), (path.name, what)
+            if path.name in READ:
+                with pytest.raises(UserError):
+                    read_asset(folder)
+        (folder / path.name).unlink()
+        assert any(problem.startswith(f"{path.name}:") for problem in validate_asset(folder)), path.name
 
 
-def video(value: dict[str, Any]) -> dict[str, Any]:
-    found: dict[str, Any] = value["levels"][0]["texture"]["videos"][0]
-    return found
+def textures(**values: object) -> Callable[[Any], object]:
+    """Values of the textures of all levels."""
+    return lambda manifest: [level["texture"].update(values) for level in manifest["levels"]]
 
 
-def add_up(value: dict[str, Any]) -> None:
-    """Correct the level's total after a change of a file's size."""
-    level = value["levels"][0]
-    level["bytes"] = sum(entry["bytes"] for entry in [*level["meshes"], *level["texture"]["videos"]])
-
-
-def replace_mesh(folder: Path, data: bytes, vertices: int, triangles: int) -> None:
-    """Of layer 1, the last in the level's file."""
-    path, digest = folder / "full_meshes.bin", hashlib.sha256(data).hexdigest()
-    entry = {"bytes": len(data), "sha256": digest, "vertices": vertices, "triangles": triangles}
-
-    def change(value: dict[str, Any]) -> None:
-        level = value["levels"][0]
-        level["layers"][1].update(entry)
-        path.write_bytes(path.read_bytes()[: level["layers"][1]["offset"]] + data)
-        level["meshes"][0].update(bytes=path.stat().st_size, sha256=file_sha256(path))
-        add_up(value)
-
-    edit(folder, change)
-
-
-def draco(vertices: np.ndarray, faces: np.ndarray, st: np.ndarray | None) -> bytes:
-    """As the writer encodes, but without its checks."""
-    coordinates = None if st is None else st.astype(np.float64)
-    return bytes(
-        DracoPy.encode(
-            vertices,
-            faces=faces.astype(np.uint32),
-            quantization_bits=0,
-            compression_level=0,
-            tex_coord=coordinates,
-            preserve_order=True,
-        )
-    )
-
-
-def test_sound(asset: Path) -> None:
-    assert validate_asset(asset) == []
-
-
-def level(value: dict[str, Any]) -> dict[str, Any]:
-    found: dict[str, Any] = value["levels"][0]
-    return found
-
-
-def layer(value: dict[str, Any], index: int = 1) -> dict[str, Any]:
-    found: dict[str, Any] = level(value)["layers"][index]
-    return found
-
-
-def texture(value: dict[str, Any]) -> dict[str, Any]:
-    found: dict[str, Any] = level(value)["texture"]
-    return found
-
-
+FULL = ("levels", 1)
+LAYER, TEXTURE = (*FULL, "layers", 2), (*FULL, "texture")
+ROTATION = ("coordinates", "to_capture", "rotation")
 MIRRORED = [[1, 0, 0], [0, 1, 0], [0, 0, -1]]
-WRONG: list[tuple[Callable[[dict[str, Any]], None], str, str]] = [
-    (lambda value: layer(value).update(vertices=layer(value)["vertices"] + 1), "full_meshes.bin", "vertices"),
-    (lambda value: layer(value).update(triangles=layer(value)["triangles"] + 1), "full_meshes.bin", "triangles"),
-    (lambda value: layer(value).update(offset=1), "full_meshes.bin", "layer 1: the SHA-256"),
-    (lambda value: layer(value).update(offset=10**6), "manifest.json", "not inside a file"),
-    (lambda value: layer(value).update(texture_rect=[130, 4, 64, 64]), "manifest.json", "not inside"),
-    (lambda value: layer(value).update(texture_rect=layer(value, 0)["texture_rect"]), "manifest.json", "overlap"),
-    (lambda value: layer(value).update(uv_window=[0.5, 0.5, -1.0, 1.0]), "manifest.json", "uv_window"),
-    (lambda value: texture(value).update(frames=2), "full.mp4", "3 frames"),
-    (lambda value: texture(value).update(frames=4), "full.mp4", "3 frames"),
-    (lambda value: texture(value).update(width=texture(value)["width"] + 16), "full.mp4", "width and height"),
-    (lambda value: texture(value).update(keyframes=[0, 3]), "manifest.json", "keyframes"),
-    (lambda value: texture(value).update(keyframes=[1]), "manifest.json", "keyframes"),
-    (lambda value: texture(value).update(keyframes=[0, 2, 1]), "manifest.json", "keyframes"),
-    (lambda value: level(value).update(bytes=level(value)["bytes"] + 1), "manifest.json", "those of its files"),
-    (lambda value: value.update(levels=value["levels"] * 2), "manifest.json", "one name"),
-    (lambda value: value["coordinates"]["to_capture"].update(rotation=MIRRORED), "manifest.json", "rotation"),
+WRONG: list[tuple[Callable[[Any], object], str, str]] = [
+    (put(*LAYER, "vertices", to=7), "full_meshes.bin", "vertices"),
+    (put(*LAYER, "triangles", to=7), "full_meshes.bin", "triangles"),
+    (put(*LAYER, "offset", to=1), "full_meshes.bin", "layer 2: the SHA-256"),
+    (put(*LAYER, "offset", to=10**6), "manifest.json", "not inside a file"),
+    (put(*LAYER, "texture_rect", to=[10**4, 4, 64, 64]), "manifest.json", "not inside"),
+    (put(*LAYER, "texture_rect", to=[5, 5, 64, 64]), "manifest.json", "overlap"),
+    (put(*LAYER, "uv_window", to=[0.5, 0.5, -1.0, 1.0]), "manifest.json", "uv_window"),
+    (textures(frames=5), "full.mp4", "6 frames"),
+    (textures(frames=7), "full.mp4", "6 frames"),
+    (put(*TEXTURE, "width", to=1024), "full.mp4", "width and height"),
+    (put(*TEXTURE, "keyframes", to=[0, 6]), "manifest.json", "keyframes"),
+    (put(*TEXTURE, "keyframes", to=[1]), "manifest.json", "keyframes"),
+    (put(*TEXTURE, "keyframes", to=[0, 2, 1]), "manifest.json", "keyframes"),
+    (put(*FULL, "bytes", to=1), "manifest.json", "those of its files"),
+    (lambda manifest: manifest.update(levels=manifest["levels"] * 2), "manifest.json", "one name"),
+    (put(*ROTATION, to=MIRRORED), "manifest.json", "rotation"),
 ]
 
 
 @pytest.mark.parametrize(("change", "file", "word"), WRONG)
-def test_wrong_values(asset: Path, change: Callable[[dict[str, Any]], None], file: str, word: str) -> None:
-    edit(asset, change)
-    assert_found(asset, file, word)
+def test_wrong_values(rich_copy: Path, change: Callable[[Any], object], file: str, word: str) -> None:
+    edit(rich_copy, change)
+    assert_found(rich_copy, file, word)
 
 
 @pytest.mark.parametrize(
     ("change", "word"),
     [
-        (lambda value: texture(value).update(frame_rate=[25, 1]), "frames a second"),
-        (lambda value: video(value).update(mime='video/mp4; codecs="avc1.42001e"'), "MIME type"),
+        (textures(frame_rate=[25, 1]), "frames a second"),
+        (put(*TEXTURE, "videos", 0, "mime", to='video/mp4; codecs="avc1.42001e"'), "MIME type"),
     ],
 )
-def test_what_is_wrong_but_can_be_read(asset: Path, change: Callable[[dict[str, Any]], None], word: str) -> None:
-    edit(asset, change)
-    assert any(word in problem for problem in validate_asset(asset))
+def test_what_is_wrong_but_can_be_read(rich_copy: Path, change: Callable[[Any], object], word: str) -> None:
+    edit(rich_copy, change)
+    assert any(word in problem for problem in validate_asset(rich_copy))
 
 
-def test_meshes_that_are_none(asset: Path) -> None:
+def replace_mesh(folder: Path, data: bytes, vertices: int, triangles: int) -> None:
+    """Of the full level's last layer."""
+    path, entry = folder / "full_meshes.bin", {"bytes": len(data), "sha256": hashlib.sha256(data).hexdigest()}
+
+    def change(value: dict[str, Any]) -> None:
+        level = value["levels"][1]
+        level["layers"][2].update(entry, vertices=vertices, triangles=triangles)
+        path.write_bytes(path.read_bytes()[: level["layers"][2]["offset"]] + data)
+        level["meshes"][0].update(file_entry(path))
+
+    change_manifest(folder, change)
+
+
+def draco(vertices: np.ndarray, faces: np.ndarray, st: np.ndarray | None) -> bytes:
+    """As the writer encodes, but without its checks."""
+    coordinates = None if st is None else st.astype(np.float64)
+    options = {"quantization_bits": 0, "compression_level": 0, "tex_coord": coordinates, "preserve_order": True}
+    return bytes(DracoPy.encode(vertices, faces=faces.astype(np.uint32), **options))
+
+
+def test_meshes_that_are_none(rich_copy: Path) -> None:
     mesh = cap_mesh(0.3, 4)
     holed, thin = mesh.vertices.copy(), mesh.vertices.copy()
     holed[5, 2], thin[1] = np.nan, thin[0]
@@ -161,20 +131,20 @@ def test_meshes_that_are_none(asset: Path) -> None:
         (draco(holed, mesh.faces, mesh.st), "not finite"),
         (b"something else" * 9, "not a Draco mesh"),
     ):
-        replace_mesh(asset, data, 16, 18)
-        assert_found(asset, "full_meshes.bin", word)
-    replace_mesh(asset, draco(thin, mesh.faces, mesh.st), 16, 18)
-    assert any("without area" in problem for problem in validate_asset(asset))
+        replace_mesh(rich_copy, data, 16, 18)
+        assert_found(rich_copy, "full_meshes.bin", word)
+    replace_mesh(rich_copy, draco(thin, mesh.faces, mesh.st), 16, 18)
+    assert any("without area" in problem for problem in validate_asset(rich_copy))
 
 
-def test_file_that_the_manifest_does_not_name(asset: Path) -> None:
-    (asset / "full_02.bin").write_bytes(b"")
-    assert validate_asset(asset) == ["full_02.bin: not named in the manifest"]
+def test_file_that_the_manifest_does_not_name(rich_copy: Path) -> None:
+    (rich_copy / "full_02.bin").write_bytes(b"")
+    assert validate_asset(rich_copy) == ["full_02.bin: not named in the manifest"]
 
 
-def test_the_command(asset: Path) -> None:
-    done = CliRunner().invoke(app, ["validate", str(asset)])
+def test_the_command(rich_copy: Path) -> None:
+    done = CliRunner().invoke(app, ["validate", str(rich_copy)])
     assert done.exit_code == 0 and len(done.stdout.splitlines()) == 1 and "sound" in done.stdout
-    (asset / "manifest.json").write_text("not JSON")
-    done = CliRunner().invoke(app, ["validate", str(asset)])
+    (rich_copy / "manifest.json").write_text("not JSON")
+    done = CliRunner().invoke(app, ["validate", str(rich_copy)])
     assert done.exit_code == 1 and "garbled JSON" in done.stderr

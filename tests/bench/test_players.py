@@ -7,13 +7,11 @@ from pathlib import Path
 import numpy as np
 
 from bench.players import VISIBLE, sample_splats, timing_table
-from facefolds_core.asset import read_asset
 from tests.assets import CENTRE, make_asset, radius_of
 
 
 def test_splats_lie_on_the_layers_where_something_is_seen(tmp_path: Path) -> None:
-    make_asset(tmp_path / "asset", layers=2, frames=2, resolution=48)
-    splats = sample_splats(read_asset(tmp_path / "asset"), 500)
+    splats = sample_splats(make_asset(tmp_path / "asset", layers=2, frames=2, resolution=48), 500)
     assert splats.nbytes == 500 * 32
     radii = np.linalg.norm(splats["centre"] - np.array(CENTRE), axis=1)
     nearest = np.min([np.abs(radii - radius_of(layer)) for layer in range(2)], axis=0)

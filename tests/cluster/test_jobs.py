@@ -9,7 +9,7 @@ import pytest
 
 from facefolds_core.cluster.job import ATTEMPTS, repro
 from facefolds_core.cluster.jobs import links_of
-from facefolds_core.cluster.run_cache import drop_empty_runs
+from facefolds_core.cluster.project import drop_empty_runs
 from facefolds_core.config.params_file import load_params
 
 
@@ -32,24 +32,21 @@ LOST = "ERROR: failed to reproduce 'configure': [Errno 2] No such file: '/p/.dvc
 DAMAGED = "WARNING: corrupted cache file '../cache/runs/47/475c/.4sh.tmp'.\nERROR: failed: 'evaluate@bad'\n"
 
 
-def _repro(*answers: tuple[int, str]) -> tuple[int, str, int]:
-    """Two jobs with a stage in common may lose DVC's record of it to each other: the stage is then run again."""
+@pytest.mark.parametrize(
+    ("answers", "expected"),
+    [
+        ([(1, LOST), (0, "done\n")], (0, LOST + "done\n", 2)),
+        ([(1, DAMAGED), (0, "")], (1, DAMAGED, 1)),  # other failures are not repeated
+        ([(0, LOST), (1, "")], (0, LOST, 1)),
+        ([(1, LOST)] * (ATTEMPTS + 1), (1, LOST * ATTEMPTS, ATTEMPTS)),  # it ends
+    ],
+)
+def test_a_record_that_was_lost_to_another_job_is_made_again(
+    answers: list[tuple[int, str]], expected: tuple[int, str, int]
+) -> None:
     left = list(answers)
     status, log = repro(lambda *_: left.pop(0), ["repro", "evaluate@a"])
-    return status, log, len(answers) - len(left)
-
-
-def test_a_lost_record_is_made_again() -> None:
-    assert _repro((1, LOST), (0, "done\n")) == (0, LOST + "done\n", 2)
-
-
-def test_other_failures_are_not_repeated() -> None:
-    assert _repro((1, DAMAGED), (0, "")) == (1, DAMAGED, 1)
-    assert _repro((0, LOST), (1, "")) == (0, LOST, 1)
-
-
-def test_it_ends() -> None:
-    assert _repro(*[(1, LOST)] * (ATTEMPTS + 1)) == (1, LOST * ATTEMPTS, ATTEMPTS)
+    assert (status, log, len(answers) - len(left)) == expected
 
 
 def test_only_empty_folders_that_stay_so_are_removed(tmp_path: Path) -> None:

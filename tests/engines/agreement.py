@@ -22,9 +22,8 @@ from facefolds_core.asset import read_asset
 from facefolds_core.asset.glb import write_glb
 from facefolds_core.asset.reader import AssetLevel
 from facefolds_core.cli.render import pick_level
-from facefolds_core.engines.godot import write_godot
-from facefolds_core.engines.usd import STAGE, write_usd
 from facefolds_core.geometry.cameras import Camera
+from facefolds_core.registry import EXPORTERS
 from tests.chromium import FLAGS, chromium
 from tests.engines import blender, godot
 from tests.pictures import GREY_VALUE, expected_pictures, five_cameras, psnr, turned_cameras
@@ -46,14 +45,14 @@ def in_blender(level: AssetLevel, cameras: list[Camera], frames: list[int], plac
 
 
 def in_godot(level: AssetLevel, cameras: list[Camera], frames: list[int], place: Path) -> Found:
-    write_godot(place / "asset", level, "head")
+    EXPORTERS["godot"].export(place / "asset", level, "head")
     return godot.pictures(place / "asset", cameras, frames, GREY_VALUE)
 
 
 def in_blender_by_usd(level: AssetLevel, cameras: list[Camera], frames: list[int], place: Path) -> Found:
     """Blender knows no textures sampled in time: the first frame, whatever is asked for."""
-    write_usd(place / "usd", level, "head")
-    pictures = blender.pictures(place / "usd" / STAGE, cameras, GREY_VALUE)
+    EXPORTERS["usd"].export(place / "usd", level, "head")
+    pictures = blender.pictures(place / "usd" / "face.usdc", cameras, GREY_VALUE)
     return {(name, frames[0]): picture for name, picture in pictures.items()}
 
 

@@ -19,12 +19,11 @@ from facefolds_core.asset import Asset, read_asset
 from facefolds_core.engines._folder import rgb_picture
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.track import Track, rotation
-from facefolds_core.rendering import AssetCaster, composite
-from facefolds_core.rendering.reflection import reflected_colours
+from facefolds_core.rendering import AssetCaster
 from tests.assets import SOURCE, make_asset
 from tests.engines import unity_shaders
 from tests.engines.unity_checks import PACKAGE, ROOT, SHADERS, STUBS, compiled, core, missing, run, spirv
-from tests.pictures import GREY_VALUE, five_cameras, psnr
+from tests.pictures import GREY_VALUE, five_cameras, lit_picture, psnr
 from tests.viewer.fixtures import add_reflection
 
 pytestmark = pytest.mark.slow
@@ -188,15 +187,10 @@ def drawn(check: Path, asset: Asset, camera: Camera, place: Path, room: bool) ->
 
 @pytest.mark.parametrize("room", [False, True], ids=["a head at rest", "a head that turned"])
 def test_five_cameras_agree_with_the_reference(check: Path, glossy: Asset, tmp_path: Path, room: bool) -> None:
-    maps, textures = glossy.reflection(), glossy.frame(FRAME)
-    assert maps is not None
     for camera in five_cameras(SIZE):
         place = tmp_path / camera.name
         place.mkdir()
-        hits = AssetCaster(glossy).cast(camera)
-        turned = rotation(np.array(TURN)) if room else None
-        added = reflected_colours(hits, camera, glossy.full.windows, maps, turned)
-        expected, _ = composite(hits, textures, (GREY_VALUE,) * 3, added)
+        expected = lit_picture(glossy, camera, FRAME, rotation(np.array(TURN)) if room else None)
         assert psnr(drawn(check, glossy, camera, place, room), expected) >= AGREE, camera.name
         shutil.rmtree(place)
 
@@ -206,12 +200,8 @@ def test_the_shaders_pixels_agree_with_the_reference(glossy: Asset, tmp_path: Pa
     """As HLSL says it, drawn by OpenGL: five views, folds and the reflection included."""
     if reason := missing("glslangValidator", "spirv-cross"):
         pytest.skip(reason)
-    maps, textures = glossy.reflection(), glossy.frame(FRAME)
-    assert maps is not None
     turned = rotation(np.array(TURN)) if room else np.eye(3)
     for camera in five_cameras(2 * SIZE):
-        hits = AssetCaster(glossy).cast(camera)
-        added = reflected_colours(hits, camera, glossy.full.windows, maps, turned)
-        expected, _ = composite(hits, textures, (GREY_VALUE,) * 3, added)
+        expected = lit_picture(glossy, camera, FRAME, turned)
         found = unity_shaders.drawn(glossy.full, camera, FRAME, turned, GREY_VALUE, tmp_path)
         assert psnr(found, expected) >= SHADERS_AGREE, camera.name

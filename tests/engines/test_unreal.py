@@ -10,7 +10,6 @@ from unittest.mock import MagicMock
 
 import pytest
 
-from facefolds_core.asset import read_asset
 from facefolds_core.asset.gltf.writing import write_layered
 from tests.assets import make_asset
 
@@ -38,8 +37,7 @@ def loaded() -> ModuleType:
 
 
 def test_sequence_materials_and_slots(unreal: MagicMock, tmp_path: Path) -> None:
-    make_asset(tmp_path / "asset", layers=2, frames=2, resolution=32)
-    level = read_asset(tmp_path / "asset").full
+    level = make_asset(tmp_path / "asset", layers=2, frames=2, resolution=32).full
     write_layered(tmp_path / "face.glb", level, "caps")
     (tmp_path / "textures").mkdir()
     for name in ("frame_00001.jpg", "frame_00000.jpg"):

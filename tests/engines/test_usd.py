@@ -11,8 +11,8 @@ import pytest
 from numpy.typing import NDArray
 from PIL import Image
 
-from facefolds_core.asset import Asset, read_asset
-from facefolds_core.engines.usd import STAGE, write_usd
+from facefolds_core.asset import Asset
+from facefolds_core.engines.usd import STAGE, export
 from facefolds_core.errors import UserError
 from tests.assets import make_asset
 from tests.engines.tracks import with_track
@@ -25,14 +25,12 @@ FRAMES = 3
 
 @pytest.fixture(scope="module")
 def caps(tmp_path_factory: pytest.TempPathFactory) -> Asset:
-    folder = tmp_path_factory.mktemp("caps") / "asset"
-    make_asset(folder, layers=3, frames=FRAMES, resolution=64)
-    return read_asset(folder)
+    return make_asset(tmp_path_factory.mktemp("caps") / "asset", layers=3, frames=FRAMES, resolution=64)
 
 
 @pytest.fixture(scope="module")
 def exported(caps: Asset) -> Path:
-    write_usd(caps.folder.parent / "usd", caps.full, "caps")
+    export(caps.folder.parent / "usd", caps.full, "caps")
     return caps.folder.parent / "usd"
 
 
@@ -61,7 +59,7 @@ def test_the_checker_finds_a_missing_picture(exported: Path, tmp_path: Path) -> 
 
 
 def test_a_package_is_whole(caps: Asset, tmp_path: Path) -> None:
-    write_usd(tmp_path / "face.usdz", caps.full, "caps")
+    export(tmp_path / "face.usdz", caps.full, "caps")
     assert complaints(tmp_path / "face.usdz") == []
     assert [path.name for path in tmp_path.iterdir()] == ["face.usdz"]
 
@@ -129,7 +127,7 @@ def test_a_head_that_moves_has_its_pose_in_each_frame(caps: Asset, tmp_path: Pat
     from pxr import Gf, UsdGeom
 
     level = with_track(caps.full)
-    write_usd(tmp_path / "usd", level, "caps")
+    export(tmp_path / "usd", level, "caps")
     stage = opened(tmp_path / "usd" / STAGE)
     head = stage.GetPrimAtPath("/Face/Head")
     assert level.track is not None
@@ -143,5 +141,5 @@ def test_a_head_that_moves_has_its_pose_in_each_frame(caps: Asset, tmp_path: Pat
 def test_a_folder_with_other_files_is_left_alone(caps: Asset, tmp_path: Path) -> None:
     (tmp_path / "precious").write_text("mine")
     with pytest.raises(UserError, match="not empty"):
-        write_usd(tmp_path, caps.full, "caps")
+        export(tmp_path, caps.full, "caps")
     assert (tmp_path / "precious").is_file()

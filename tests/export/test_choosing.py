@@ -31,6 +31,7 @@ from facefolds_core.pipeline.choices import write_choice
 from facefolds_core.rendering import composite
 from facefolds_core.rendering.raster import cast_layers
 from facefolds_core.rendering.reflection import reflected_colours
+from tests.assets import grid_faces
 from tests.ellipsoids import Ellipsoids
 from tests.scenes import make_scene
 
@@ -43,11 +44,8 @@ def ball(n: int) -> TexturedMesh:
     z, y = np.meshgrid(angles[::-1], angles, indexing="ij")
     points = 0.3 * np.stack([np.cos(y) * np.cos(z), np.sin(y) * np.cos(z), np.sin(z)], -1)
     st = np.stack([(y + 1.2) / 2.4, (1.2 - z) / 2.4], -1)
-    a = (np.arange(n - 1)[:, None] * n + np.arange(n - 1)).reshape(-1)
-    faces = np.concatenate([np.stack([a, a + n, a + 1], -1), np.stack([a + 1, a + n, a + n + 1], -1)])
-    return TexturedMesh(
-        points.reshape(-1, 3).astype(np.float32), faces.astype(np.int32), st.reshape(-1, 2).astype(np.float32)
-    )
+    points, st = points.reshape(-1, 3).astype(np.float32), st.reshape(-1, 2).astype(np.float32)
+    return TexturedMesh(points, grid_faces(n), st)
 
 
 def stripes(period: float) -> NDArray[np.uint8]:

@@ -91,12 +91,6 @@ def test_layers_in_order_do_not_cross(grids: Grids, surfaces: list[Surface]) -> 
     assert order.crossed == 0
 
 
-def test_layers_out_of_order_are_counted(surfaces: list[Surface]) -> None:
-    order = layer_order([surfaces[1], surfaces[0]], CHART)
-    assert order.crossed == order.compared
-    assert order.deepest == pytest.approx(0.03, abs=2e-3)
-
-
 def test_a_surface_too_many_is_an_error(grids: Grids, surfaces: list[Surface]) -> None:
     with pytest.raises(UserError, match="do not belong together"):
         decimate_layers(surfaces * 2, grids, 16, DecimateParams())

@@ -16,7 +16,8 @@ from facefolds_core.export.kept import KeptFrames
 from facefolds_core.files.frame_store import FrameStore, write_frames
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.kernels.hit_codes import SCALE
-from tests.export.rays_reference import composite, look_up
+from facefolds_core.model.compositing import compositing_weights
+from facefolds_core.training.explicit.reference import look_up
 from tests.scenes import look_at_origin
 
 
@@ -74,8 +75,9 @@ def test_weights_bound_what_errors_of_all_layers_do() -> None:
     def colour(layer: int, channel: int, change: float) -> np.ndarray:
         moved = texture.copy()
         moved[layer, :, :, channel] += change
-        seen = composite(look_up(torch.tensor(codes.astype(np.int32)), torch.tensor(moved / 255)))
-        return np.asarray(seen[0, :3]) * 255
+        seen = look_up(torch.tensor(codes.astype(np.int32)), torch.tensor(moved.transpose(1, 2, 0, 3) / 255))
+        weights, _ = compositing_weights(seen[..., 3])
+        return np.asarray((weights[..., None] * seen[..., :3]).sum(1)[0]) * 255
 
     def derivative(layer: int, channel: int) -> np.ndarray:
         return np.asarray(colour(layer, channel, 10) - colour(layer, channel, -10)) / 20
@@ -93,10 +95,10 @@ def test_rays_that_may_show_anything_are_kept() -> None:
     mesh = TexturedMesh(square, np.array([[0, 2, 1], [0, 3, 2]], np.int32), st)
     opacity = np.zeros((1, 64, 64), np.uint8)
     opacity[:, :, :32] = 255
-    codes = shown_rays([look_at_origin("front", 0, 0, 64)], [mesh], opacity, progress=False)
+    codes = shown_rays([look_at_origin("front", 0, 0, 64)], [mesh], opacity)
     places = (codes[:, 0].astype(float) - 1) / SCALE
     assert len(codes) > 50 and 0.45 < places[:, 0].max() < 0.53 and places[:, 1].max() > 0.9
-    nothing = shown_rays([look_at_origin("front", 0, 0, 64)], [mesh], np.zeros_like(opacity), progress=False)
+    nothing = shown_rays([look_at_origin("front", 0, 0, 64)], [mesh], np.zeros_like(opacity))
     assert nothing.shape == (0, 1, 2)
 
 
@@ -112,7 +114,7 @@ def test_what_shows_moves_and_what_does_not_stays(memory: int, tmp_path: Path) -
     store = FrameStore(path)
     weights = texel_weights(codes, store, 1)
     found = np.empty_like(textures)
-    for layer, frame, image in held_rows(store, weights, 1.0, tmp_path, memory, progress=False):
+    for layer, frame, image in held_rows(store, weights, 1.0, tmp_path, memory):
         found[layer, frame] = image
     assert [p.name for p in tmp_path.iterdir()] == ["textures.arrow"]
     assert (found[0] == textures[0]).mean() > 0.99
@@ -137,7 +139,7 @@ def held(
     """One layer of images (K, 8, 8, 4)."""
     write_frames(folder / "t.arrow", (8, 8, 4), ((0, k, one) for k, one in enumerate(images)))
     weights, store = np.full((1, 8, 8, 2), weight, np.float32), FrameStore(folder / "t.arrow")
-    rows = list(held_rows(store, weights, 1.0, folder, 1 << 20, window, kept, progress=False))
+    rows = list(held_rows(store, weights, 1.0, folder, 1 << 20, window, kept))
     if kept is not None:
         write_frames(folder / "held.arrow", (8, 8, 4), rows, packed=True)
         kept.keep(folder / "held.arrow")

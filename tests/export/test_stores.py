@@ -14,16 +14,14 @@ from facefolds_core.export.sampling import sample_grids
 from facefolds_core.export.sheets import grid_sheets
 from facefolds_core.export.stores import (
     Grids,
-    holds_sheets,
-    read_chart,
+    Sheets,
     read_grids,
     read_meshes,
-    read_sheets,
+    read_places,
     read_surfaces,
     write_grids,
     write_meshes,
     write_sheets,
-    write_surfaces,
 )
 from facefolds_core.geometry.chart import Belt, Chart
 from facefolds_core.geometry.meshes import Surface, TexturedMesh
@@ -54,27 +52,26 @@ def test_meshes_and_surfaces_round_trip_and_are_the_same_bytes_each_time(tmp_pat
     first, second = read_meshes(tmp_path / "a.npz")
     assert np.array_equal(second.st, TRIANGLE.st)
     assert np.array_equal(first.faces, TRIANGLE.faces)
-    write_surfaces(tmp_path / "surfaces.npz", [Surface(TRIANGLE.vertices, TRIANGLE.faces)])
+    write_meshes(tmp_path / "surfaces.npz", [Surface(TRIANGLE.vertices, TRIANGLE.faces)])
     (back,) = read_surfaces(tmp_path / "surfaces.npz")
     assert np.array_equal(back.vertices, TRIANGLE.vertices)
 
 
-def test_sheets_round_trip_and_are_told_from_surfaces(tmp_path: Path, grids: Grids) -> None:
-    sheets = grid_sheets(grids, None)
+@pytest.mark.parametrize("belt", [None, Belt(0.2, 0.3)])
+def test_sheets_round_trip(tmp_path: Path, grids: Grids, belt: Belt | None) -> None:
+    sheets = replace(grid_sheets(grids, None), chart=Chart((0.1, 0.2, 0.3), belt))
     write_sheets(tmp_path / "sheets.npz", sheets)
-    write_surfaces(tmp_path / "surfaces.npz", [Surface(TRIANGLE.vertices, TRIANGLE.faces)])
-    back = read_sheets(tmp_path / "sheets.npz")
+    back = read_surfaces(tmp_path / "sheets.npz")
+    assert isinstance(back, Sheets)
     for field in fields(sheets):
         assert np.array_equal(getattr(back, field.name), getattr(sheets, field.name))
-    assert holds_sheets(tmp_path / "sheets.npz")
-    assert not holds_sheets(tmp_path / "surfaces.npz")
 
 
 @pytest.mark.parametrize("belt", [None, Belt(0.2, 0.3)])
-def test_the_chart_can_be_read_alone(tmp_path: Path, grids: Grids, belt: Belt | None) -> None:
+def test_the_chart_can_be_read_without_the_samples(tmp_path: Path, grids: Grids, belt: Belt | None) -> None:
     chart = Chart((0.1, 0.2, 0.3), belt)
     write_grids(tmp_path / "grids.npz", replace(grids, chart=chart))
-    assert read_chart(tmp_path / "grids.npz") == chart
+    assert read_places(tmp_path / "grids.npz")[1] == read_grids(tmp_path / "grids.npz").chart == chart
 
 
 @pytest.mark.parametrize("length", [0, 10, 500, 2000])
@@ -134,7 +131,7 @@ def test_wrong_grids_are_errors(tmp_path: Path, grids: Grids, change: dict[str, 
 def test_wrong_sheets_are_errors(tmp_path: Path, grids: Grids, change: dict[str, Any], place: str) -> None:
     write_sheets(tmp_path / "surfaces.npz", replace(grid_sheets(grids, None), **change))
     with pytest.raises(UserError, match=place):
-        read_sheets(tmp_path / "surfaces.npz")
+        read_surfaces(tmp_path / "surfaces.npz")
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,9 @@ import errno
 import os
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import av
 import pytest
@@ -39,6 +41,21 @@ def test_what_another_process_writes_is_left_alone(tmp_path: Path) -> None:
             (second / "y").write_text("2")
         assert names(first) == ["x"]
     assert names(tmp_path) == ["a", "b"]
+
+
+@pytest.mark.parametrize("atomic", [atomic_file, atomic_folder])
+def test_a_failure_leaves_the_old_one_and_nothing_beside(tmp_path: Path, atomic: Callable[[Path], Any]) -> None:
+    def write(text: str) -> None:
+        with atomic(tmp_path / "a") as temporary:
+            (temporary if atomic is atomic_file else temporary / "x").write_text(text)
+            if text == "half":
+                raise RuntimeError
+
+    write("old")
+    with pytest.raises(RuntimeError):
+        write("half")
+    assert names(tmp_path) == ["a"]
+    assert [path.read_text() for path in tmp_path.rglob("*") if path.is_file()] == ["old"]
 
 
 KILLS = """

@@ -17,7 +17,7 @@ import torch
 import yaml
 
 import facefolds_core
-from facefolds_core.errors import report_user_errors
+from facefolds_core.errors import UserError, report_user_errors
 from facefolds_core.files.writing import PREFIX, write_text
 
 ALWAYS = (
@@ -30,6 +30,13 @@ def said(error: BaseException, capsys: pytest.CaptureFixture[str]) -> tuple[obje
     with pytest.raises(SystemExit) as stop, report_user_errors("train"):
         raise error
     return stop.value.code, capsys.readouterr().err
+
+
+def test_a_users_mistake_is_one_message_that_names_everything(capsys: pytest.CaptureFixture[str]) -> None:
+    error = UserError("bad", file="KRT", place="line 3", expected="3 numbers", found="2", remedy="mend it")
+    status, text = said(error, capsys)
+    assert status == 1 and "train: error: bad" in text and "Traceback" not in text
+    assert all(part in text for part in ("KRT", "line 3", "3 numbers", "2", "mend it"))
 
 
 @pytest.mark.parametrize("name", [*ALWAYS, "ENOENT", "EEXIST", "ENOTEMPTY"])
@@ -111,7 +118,7 @@ def test_ctrl_c_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:
 SLEEPS = """
 import sys, time
 from pathlib import Path
-from facefolds_core.errors import report_user_errors
+from facefolds_core.errors import UserError, report_user_errors
 from facefolds_core.files.writing import atomic_folder
 with report_user_errors("train"), atomic_folder(Path(sys.argv[1])) as temporary:
     (temporary / "half").write_text("1")
@@ -141,7 +148,7 @@ def test_signals_end_with_one_line_and_without_leftovers(
 
 
 def test_an_output_that_nobody_reads_any_more_is_no_error(project_root: Path) -> None:
-    code = "from facefolds_core.errors import report_user_errors\nwith report_user_errors('x'):\n"
+    code = "from facefolds_core.errors import UserError, report_user_errors\nwith report_user_errors('x'):\n"
     code += "    for _ in range(100000): print('line', flush=True)"
     done = subprocess.run(
         ["bash", "-c", f'{sys.executable} -c "$0" | head -1', code],

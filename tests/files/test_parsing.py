@@ -9,7 +9,7 @@ import pytest
 
 from facefolds_core.errors import UserError
 from facefolds_core.files.parsing import MAX_DEPTH, brief, parse_json, parse_yaml
-from facefolds_core.files.writing import read_json
+from facefolds_core.files.writing import read_json, write_json
 
 DIGITS = "9" * 5000
 
@@ -25,11 +25,14 @@ DIGITS = "9" * 5000
         ('{"a":' * 100_000, "too deeply"),
         ('{"a": 1, "a": 2}', "given twice"),
         ("{", "line 1"),
+        ("", "line 1"),
+        ("{\n 1}", "line 2"),
+        ('{"a": "\xff"}', "byte 7"),
     ],
 )
 def test_json(text: str, says: str, tmp_path: Path) -> None:
     path = tmp_path / "a.json"
-    path.write_text(text, encoding="utf-8")
+    path.write_text(text, encoding="latin-1")
     with pytest.raises(UserError, match=says) as caught:
         read_json(path)
     assert str(path) in str(caught.value)
@@ -39,6 +42,16 @@ def test_json(text: str, says: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize("text", ["9223372036854775807", "[" * MAX_DEPTH + "]" * MAX_DEPTH, '{"a": 1e300}', "-1", '""'])
 def test_sound_json(text: str) -> None:
     assert parse_json(text, "a.json", "") == json.loads(text)
+
+
+def test_what_is_written_is_read_and_nan_is_never_written(tmp_path: Path) -> None:
+    value = {"a": [1, 2.5, None, "ä"]}
+    write_json(tmp_path / "a.json", value)
+    assert read_json(tmp_path / "a.json") == json.loads((tmp_path / "a.json").read_text()) == value
+    with pytest.raises(ValueError):
+        write_json(tmp_path / "b.json", {"psnr": float("nan")})
+    with pytest.raises(UserError, match="file not found"):
+        read_json(tmp_path / "b.json")
 
 
 LAUGHS = "a: &a [x, x, x, x, x, x, x, x, x, x]\n" + "".join(

@@ -228,3 +228,21 @@ def seal(place: Path, value: Any) -> None:
     text = json.dumps(value | {"manifest_sha256": UNSEALED}, indent=1)
     digest = hashlib.sha256(text.encode()).hexdigest()
     (place / "manifest.json").write_text(text.replace(UNSEALED, digest))
+
+
+def edit(place: Path, change: Callable[[Any], object]) -> None:
+    """Change the manifest as JSON, and seal it again."""
+    value = json.loads((place / "manifest.json").read_text())
+    change(value)
+    seal(place, value)
+
+
+def put(*keys: str | int, to: object) -> Callable[[Any], None]:
+    """For `edit`: another value at a place."""
+
+    def change(value: Any) -> None:
+        for key in keys[:-1]:
+            value = value[key]
+        value[keys[-1]] = to
+
+    return change

@@ -26,17 +26,13 @@ from facefolds_core.export.sheets import grid_sheets
 from facefolds_core.export.stores import (
     Grids,
     Sheets,
-    holds_sheets,
-    read_chart,
     read_grids,
     read_meshes,
-    read_sheets,
+    read_places,
     read_surfaces,
-    read_windows,
     write_grids,
     write_meshes,
     write_sheets,
-    write_surfaces,
 )
 from facefolds_core.files.frame_store import FrameStore, write_frames
 from facefolds_core.geometry.chart import Belt, Chart
@@ -101,12 +97,12 @@ def _parts(stored: Grids | Sheets) -> list[Any]:
 
 def _grids(folder: Path) -> Any:
     path = folder / "samples" / "grids.npz"
-    return [*_parts(read_grids(path)), np.array(read_windows(path)), repr(read_chart(path))]
+    return [*_parts(read_grids(path)), *map(repr, read_places(path)[:2])]
 
 
 def _sheets(folder: Path) -> Any:
     path = folder / "surfaces" / "sheets.npz"
-    return [*_parts(read_sheets(path)), np.array(holds_sheets(path))]
+    return _parts(read_surfaces(path))
 
 
 def _surfaces(folder: Path) -> Any:
@@ -152,7 +148,7 @@ def make(root: Path) -> None:
     write_grids(root / "samples" / "grids.npz", grids)
     write_sheets(root / "surfaces" / "sheets.npz", grid_sheets(grids, None))
     mesh = TexturedMesh(vertices[0], faces, random.random((5, 2)).astype(np.float32))
-    write_surfaces(root / "surfaces" / "surfaces.npz", [mesh, mesh])
+    write_meshes(root / "surfaces" / "surfaces.npz", [mesh, mesh])
     write_meshes(root / "meshes" / "meshes.npz", [mesh, mesh])
     torch.manual_seed(0)
     save_model(build_model(SPEC), SPEC, root / "model")

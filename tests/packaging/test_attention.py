@@ -17,7 +17,8 @@ from facefolds_core.asset.video import decode_video, encode_video, pack_frame, u
 from facefolds_core.asset.writer import LevelContent
 from facefolds_core.packaging.attention import block_weights, merged, offsets, regions_of, views_of
 from facefolds_core.params import AttentionParams, VideoCodec
-from facefolds_core.rendering import AssetCaster, composite
+from facefolds_core.rendering import composite
+from facefolds_core.rendering.raster import cast_layers
 from tests.vectors import FRAMES, LAYERS, RATE, TEXELS, WINDOW, Waves, cameras, sheet
 
 USUAL = AttentionParams(strength=2.0)
@@ -44,24 +45,13 @@ def content(textures: Waves | Changed, frames: int = 1) -> LevelContent:
     return LevelContent(layers, textures, frames, RATE)
 
 
-class Shown:
-    """What the reference renderer needs of a content."""
-
-    def __init__(self, full: LevelContent) -> None:
-        self.layers = [layer.mesh for layer in full.layers]
-        self._full = full
-
-    def frame(self, k: int, /) -> list[np.ndarray]:
-        return self._full.frame(k)
-
-
 @pytest.mark.parametrize("layer", range(LAYERS))
 @pytest.mark.parametrize("alpha", [False, True])
 def test_weights_are_squared_derivatives_of_pictures(layer: int, alpha: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     """Against pictures by the reference renderer of textures with one square of 16 x 16 texels changed."""
     step, channels = (8, slice(3, 4)) if alpha else (20, slice(0, 3))
     full, camera = content(Changed(layer, channels, 0)), cameras()[0]
-    hits = AssetCaster(Shown(full)).cast(camera)
+    hits = cast_layers(camera, [layer.mesh for layer in full.layers])
     low, high = (composite(hits, content(Changed(layer, channels, by)).frame(0))[0] for by in (-2 * step, 0))
     squares = float(((high.astype(float) - low) ** 2).mean(-1).sum()) * (255 / (2 * step)) ** 2
     # In the picture, the changed square; blocks that it lies across.

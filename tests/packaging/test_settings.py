@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from facefolds_core.packaging.settings import LevelSetting
+from facefolds_core.packaging.settings import fitted, level_params
 from facefolds_core.params import CompressParams, LevelParams, MeshCodec, VideoCodec
 from tests.assets import cap_crops
 from tests.scenes import look_at_origin
@@ -15,31 +15,31 @@ COARSE = LevelParams(name="small", mesh_resolution=16, texture_resolution=64, cr
 
 
 def test_the_full_level_is_coded_as_configured() -> None:
-    found = LevelSetting.of(PARAMS)
+    found = level_params(PARAMS)
     assert (found.mesh, found.video) == (PARAMS.mesh, PARAMS.video)
 
 
 def test_a_coarser_level_has_a_rate_and_an_error_of_its_own() -> None:
-    found = LevelSetting.of(PARAMS, COARSE)
+    found = level_params(PARAMS, COARSE)
     assert (found.video.crf, found.video.target_psnr) == (31, None)
     assert (found.video.keyframe_interval, found.mesh.max_error_pixels, found.mesh.compression_level) == (12, 0.1, 3)
-    assert LevelSetting.of(PARAMS, COARSE.model_copy(update={"max_error_pixels": 0.5})).mesh.max_error_pixels == 0.5
+    assert level_params(PARAMS, COARSE.model_copy(update={"max_error_pixels": 0.5})).mesh.max_error_pixels == 0.5
 
 
 def test_a_stream_has_one_key_frame_a_segment() -> None:
-    assert LevelSetting.of(PARAMS, interval=60).video.keyframe_interval == 60
-    assert LevelSetting.of(PARAMS, COARSE, 60).video.keyframe_interval == 60
+    assert level_params(PARAMS, interval=60).video.keyframe_interval == 60
+    assert level_params(PARAMS, COARSE, 60).video.keyframe_interval == 60
 
 
 def test_bits_of_a_mesh_follow_from_the_error_that_is_allowed() -> None:
     layers, cameras = cap_crops(2, 1, 32), [look_at_origin("a", 0.0, 0.0, 64)]
-    asked = LevelSetting.of(PARAMS)
+    asked = level_params(PARAMS)
     fine, coarse = (
-        LevelSetting.of(PARAMS, COARSE.model_copy(update={"max_error_pixels": error})).fitted(layers, cameras)
+        fitted(level_params(PARAMS, COARSE.model_copy(update={"max_error_pixels": error})), layers, cameras)
         for error in (0.05, 0.4)
     )
     assert coarse.mesh.quantization_bits < fine.mesh.quantization_bits <= 20
     assert coarse.mesh.compression_level == 3
-    assert asked.fitted(layers, []) == asked  # nobody sees it
-    exact = LevelSetting.of(PARAMS.model_copy(update={"mesh": MeshCodec(max_error_pixels=None, quantization_bits=11)}))
-    assert exact.fitted(layers, cameras) == exact
+    assert fitted(asked, layers, []) == asked  # nobody sees it
+    exact = level_params(PARAMS.model_copy(update={"mesh": MeshCodec(max_error_pixels=None, quantization_bits=11)}))
+    assert fitted(exact, layers, cameras) == exact

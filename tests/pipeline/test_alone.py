@@ -134,7 +134,7 @@ def test_what_ends_while_another_dvc_holds_the_lock_is_recorded(folder: Path, pr
     lock = try_lock(folder / ".dvc" / "tmp" / "lock")
     assert lock is not None
     time.sleep(6)
-    lock.release()
+    lock.close()
     output, _ = process.communicate(timeout=30)
     assert process.returncode == 0, output
     assert "waiting for another DVC" in output

@@ -163,7 +163,7 @@ def test_a_dvc_at_work_is_not_disturbed(project: Path, monkeypatch: pytest.Monke
             mend(project)
         assert (project / "dvc.lock").exists()
     finally:
-        lock.release()
+        lock.close()
         (project / "dvc.lock").write_bytes(good)
 
 
@@ -171,7 +171,7 @@ def test_the_lock_is_the_one_that_dvc_waits_for(project: Path) -> None:
     lock = try_lock(project / ".dvc" / "tmp" / "lock")
     assert lock is not None
     status, output = dvc(project)
-    lock.release()
+    lock.close()
     assert status != 0
     assert "Unable to acquire lock" in output
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import cast
@@ -10,15 +9,13 @@ from typing import cast
 import numpy as np
 import pytest
 
-from facefolds_core.asset import read_asset
 from facefolds_core.rendering import AssetCaster, composite
 from facefolds_core.rendering.areas import AreaView, view_of
 from facefolds_core.rendering.pixels import SIDE, finer, pixel_means, render
 from facefolds_core.rendering.raster import cast_layers
 from facefolds_core.rendering.reference import Layered
 from facefolds_core.rendering.reflection import reflected_colours
-from tests.asset.test_track import TRACK
-from tests.assets import SOURCE, make_asset
+from tests.assets import MOVING, make_asset
 from tests.pictures import psnr
 from tests.rendering.test_raster import Meshes, bumpy
 from tests.scenes import look_at_origin
@@ -50,8 +47,7 @@ def test_it_shows_what_the_plain_renderer_shows(dtype: type) -> None:
 
 
 def test_an_asset_is_seen_with_its_reflection_and_without(tmp_path: Path) -> None:
-    make_asset(tmp_path / "asset", layers=2, frames=1, resolution=32)
-    level, maps = read_asset(tmp_path / "asset").full, random_reflection()
+    level, maps = make_asset(tmp_path / "asset", layers=2, frames=1, resolution=32).full, random_reflection()
     shining = SimpleNamespace(layers=level.layers, windows=level.windows, frame=level.frame, reflection=lambda: maps)
     camera = look_at_origin("camera", 20, 0, 24)
     fine, textures = finer(camera), level.frame(0)
@@ -67,8 +63,8 @@ def test_an_asset_is_seen_with_its_reflection_and_without(tmp_path: Path) -> Non
 
 def test_the_plain_picture_and_the_compiled_one_are_the_same(tmp_path: Path) -> None:
     """More rows than are cast at once; an asset whose head turns, and a background that is a picture."""
-    make_asset(tmp_path / "asset", layers=3, frames=3, resolution=48, source=replace(SOURCE, track=TRACK))
-    asset, camera = read_asset(tmp_path / "asset"), look_at_origin("camera", 30, 10, 150)
+    asset = make_asset(tmp_path / "asset", layers=3, frames=3, resolution=48, source=MOVING)
+    camera = look_at_origin("camera", 30, 10, 150)
     background = np.random.default_rng(0).uniform(0, 1, (150, 150, 3)).astype(np.float32)
     plain = render(asset, camera, 2, background)
     for found, expected in zip(view_of(asset, camera, 2).composite(asset.frame(2), background), plain, strict=True):

@@ -11,7 +11,7 @@ import pytest
 
 from facefolds_core.asset import read_asset
 from facefolds_core.captures.scene import Scene
-from facefolds_core.cli.cameras import named_camera
+from facefolds_core.cli.render import named_camera
 from facefolds_core.errors import UserError
 from tests.asset.filmed import HELD_OUT, filmed, packaged
 

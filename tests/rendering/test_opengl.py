@@ -35,9 +35,7 @@ from tests.viewer.fixtures import add_reflection, change_manifest, random_reflec
 
 @pytest.fixture(scope="module")
 def caps(tmp_path_factory: pytest.TempPathFactory) -> Asset:
-    folder = tmp_path_factory.mktemp("opengl") / "asset"
-    make_asset(folder, layers=5, frames=3, resolution=64)
-    return read_asset(folder)
+    return make_asset(tmp_path_factory.mktemp("opengl") / "asset", layers=5, frames=3, resolution=64)
 
 
 def psnr(found: np.ndarray, expected: np.ndarray) -> float:

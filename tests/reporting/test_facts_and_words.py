@@ -47,7 +47,6 @@ def test_scores_alone_are_enough_to_read(tmp_path: Path) -> None:
     write_text(tmp_path / "metrics.json", '{"asset": {}, "cost": {}}')
     facts = read_facts(SubjectFolders(tmp_path))
     assert (facts.images, facts.curves, facts.config) == ((), {}, {})
-    assert facts.training is None
     assert all(seconds is None for seconds, _ in facts.stages.values())
 
 
@@ -123,7 +122,7 @@ def test_ink_is_read_on_any_colour() -> None:
     assert (charts.ink_on(0.0), charts.ink_on(1.0)) == ("#ffffff", "#000000")
 
 
-def test_the_place_of_a_camera() -> None:
-    found = tables.place_of(look_at_origin("left", 30, 20, 8))
+def test_how_far_a_camera_stands_from_the_front() -> None:
+    found = tables.degrees_from_front(look_at_origin("left", 30, 20, 8))
     expected = np.degrees(np.arccos(np.cos(np.radians(30)) * np.cos(np.radians(20))))
-    assert (found.azimuth, found.elevation, found.angle) == pytest.approx((30, 20, expected))
+    assert found == pytest.approx(expected)

@@ -11,7 +11,8 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from facefolds_core.cli.report import command, evaluated_subjects
+from facefolds_core.cli.report import command
+from facefolds_core.cli.scores import evaluated_subjects
 from facefolds_core.errors import UserError
 from facefolds_core.facts import fact
 from facefolds_core.files.paths import SubjectFolders
@@ -171,11 +172,11 @@ def test_the_worst_patch_is_named(copy: SubjectFolders) -> None:
 
 def test_the_command_finds_the_subjects_that_have_scores(tmp_path: Path) -> None:
     with pytest.raises(UserError, match="no subject has been evaluated"):
-        evaluated_subjects(tmp_path)
+        evaluated_subjects(None, tmp_path)
     write_json(tmp_path / "b" / "metrics.json", {})
     write_json(tmp_path / "a" / "metrics.json", {})
     (tmp_path / "c").mkdir()
-    assert evaluated_subjects(tmp_path) == [tmp_path / "a", tmp_path / "b"]
+    assert [found.root.name for found in evaluated_subjects(None, tmp_path)] == ["a", "b"]
 
 
 def test_the_command_says_where_the_page_lies(copy: SubjectFolders) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import torch
 
-from facefolds_core.asset import Asset, read_asset
+from facefolds_core.asset import Asset
 from facefolds_core.errors import UserError
 from facefolds_core.files.frame_store import write_frames
 from facefolds_core.geometry.track import Track
@@ -112,9 +112,9 @@ def test_a_view_of_the_model_is_what_the_model_renders(view_effects: bool) -> No
 
 
 def test_the_shipped_files_are_what_is_scored(tmp_path: Path) -> None:
-    make_asset(tmp_path / "asset", layers=2, frames=FRAMES, resolution=32)
+    asset = make_asset(tmp_path / "asset", layers=2, frames=FRAMES, resolution=32)
     scene = flat_scene(tmp_path / "scene")
-    found = evaluate(scene, tiny_model(), read_asset(tmp_path / "asset"), EvaluateParams(), NO_PERCEPTUAL)
+    found = evaluate(scene, tiny_model(), asset, EvaluateParams(), NO_PERCEPTUAL)
     assert len(found.scores) == FRAMES * len(VARIANTS)
     assert found.panels[0].asset.std() > 0.05
 

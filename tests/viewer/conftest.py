@@ -7,17 +7,17 @@ import shutil
 import subprocess
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from playwright.sync_api import Page
+from playwright.sync_api import Page, Route
 
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.serving.server import serving
 from facefolds_core.system.locks import holding
 from tests.viewer.captured import captured
-from tests.viewer.fixtures import rich_asset
 
 PATIENCE = 60_000
 """Milliseconds for what takes one: software rendering on a busy machine."""
@@ -41,18 +41,6 @@ def player_folder(project_root: Path, tmp_path_factory: pytest.TempPathFactory) 
             subprocess.run([npm, "run", "--silent", "build"], cwd=source, check=True, capture_output=True)
             done.touch()
     return source / "dist"
-
-
-@pytest.fixture(scope="session")
-def rich(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """An asset with all that the format knows, not to be changed."""
-    return rich_asset(tmp_path_factory.mktemp("rich") / "asset")
-
-
-@pytest.fixture
-def rich_copy(rich: Path, tmp_path: Path) -> Path:
-    """The same, to spoil."""
-    return Path(shutil.copytree(rich, tmp_path / "asset"))
 
 
 class Player:
@@ -83,9 +71,22 @@ class Player:
         """Wait until a JavaScript condition on the element `e` holds."""
         self.page.wait_for_function(f"() => {{ const e = {ELEMENT}; return {condition}; }}", timeout=PATIENCE)
 
-    def run(self, code: str, value: object = None) -> object:
+    def run(self, code: str, value: object = None) -> Any:
         """Run JavaScript with the element as `e` and `value` as `v`; returns its result."""
         return self.page.evaluate(f"async (v) => {{ const e = {ELEMENT}; {code} }}", value)
+
+    def hold(self, addresses: str) -> Callable[[], None]:
+        """Hold back what the page asks for there; what is returned waits until it does, and lets go of it."""
+        held: list[Route] = []
+        self.page.route(addresses, lambda route: held.append(route))
+
+        def release() -> None:
+            while not held:
+                self.page.wait_for_timeout(20)
+            for route in held:
+                route.continue_()
+
+        return release
 
     def button(self, name: str) -> None:
         """Press the first visible button with that accessible name."""
@@ -138,6 +139,7 @@ def listening(page: Page) -> tuple[list[str], list[str]]:
 
 
 NewPlayer = Callable[..., Player]
+Show = Callable[..., Player]
 
 
 @pytest.fixture
@@ -173,3 +175,15 @@ def new_player(new_page: Callable[..., Page], serve: Callable[[dict[str, Path]],
         player.page.close()
         unexpected = [line for line in player.said if not any(part in line for part in allow)]
         assert unexpected == []
+
+
+@pytest.fixture
+def show(new_player: NewPlayer, rich: Path) -> Show:
+    """The page with `rich` on it; takes what `Player.open` and `new_player` take."""
+
+    def shown(view: str = "frame=0", full: bool = False, **options: object) -> Player:
+        player = new_player({"asset": rich}, **options)
+        player.open("asset", view, full=full)
+        return player
+
+    return shown

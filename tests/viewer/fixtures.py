@@ -14,12 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from facefolds_core.asset.manifest import Manifest
+from facefolds_core.asset import Asset, read_asset
+from facefolds_core.asset.manifest import Manifest, Reflection
 from facefolds_core.asset.manifest_file import parse_manifest, write_manifest
-from facefolds_core.asset.reflection import ReflectionPicture, reflection_entry
+from facefolds_core.asset.reflection import pack_reflection
 from facefolds_core.geometry.reflections import ReflectionMaps
 from facefolds_core.params import CompressParams, VideoCodec
-from tests.assets import make_asset
+from tests.assets import MOVING, make_asset
 from tests.scenes import look_at_origin
 
 THREE_CODECS = CompressParams(video=VideoCodec(codec=("h264", "vp9", "av1"), crf=8, preset="slow", keyframe_interval=4))
@@ -92,15 +93,23 @@ def random_reflection() -> ReflectionMaps:
 
 def reflection_of(folder: Path) -> dict[str, Any]:
     """Write the picture of `random_reflection`; what a level's manifest says of it."""
-    picture = ReflectionPicture.of(random_reflection())
-    (folder / "full_reflection.png").write_bytes(picture.png())
-    return reflection_entry(picture, file_entry(folder / "full_reflection.png")).model_dump(mode="json")
+    png, said = pack_reflection(random_reflection())
+    (folder / "full_reflection.png").write_bytes(png)
+    entry = Reflection.model_validate(file_entry(folder / "full_reflection.png") | said)
+    return entry.model_dump(mode="json")
 
 
 def add_reflection(folder: Path) -> None:
     """`random_reflection` in the full level."""
     entry = reflection_of(folder)
     change_manifest(folder, lambda value: value["levels"][-1].update(reflection=entry))
+
+
+def moving_asset(folder: Path, **options: Any) -> Asset:
+    """Three frames of a head that moves in the light of its room: all that the extension of glTF says."""
+    make_asset(folder, frames=3, source=MOVING, **options)
+    add_reflection(folder)
+    return read_asset(folder)
 
 
 def photo_entry(folder: Path, index: int, frame: int) -> dict[str, Any]:

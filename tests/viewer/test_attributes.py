@@ -22,9 +22,7 @@ def opened(new_player: NewPlayer, asset: Path, attributes: str = "", **options: 
 
 
 def numbers(player: Player, expression: str) -> list[float]:
-    found = player.run(f"return {expression}")
-    assert isinstance(found, list)
-    return found
+    return player.run(f"return {expression}")
 
 
 VIEW = "[e.state.view.azimuth, e.state.view.elevation, e.state.view.distance]"
@@ -216,7 +214,7 @@ def test_a_picture_of_what_is_seen(new_player: NewPlayer, rich: Path) -> None:
     code = """const blob = await e.toBlob(v); const bytes = new Uint8Array(await blob.arrayBuffer());
         return [blob.type, btoa(String.fromCharCode(...bytes))];"""
     for options, kind in (({}, "image/png"), ({"mimeType": "image/jpeg", "qualityArgument": 0.9}, "image/jpeg")):
-        found, data = player.run(code, options)  # type: ignore[misc]
+        found, data = player.run(code, options)
         assert found == kind
         picture = np.asarray(Image.open(io.BytesIO(base64.b64decode(data))).convert("RGB")) / 255
         assert np.abs(picture - player.capture()[..., :3]).mean() < 0.02

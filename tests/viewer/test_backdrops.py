@@ -56,7 +56,6 @@ def test_where_the_picture_fades_the_backdrop_stays(player: Player) -> None:
           one.drawImage(player.canvas, 3, 3, 1, 1, 0, 0, 1, 1);
           return [...one.getImageData(0, 0, 1, 1).data]; });"""
     )
-    assert isinstance(corners, list)
     assert np.abs(np.subtract(*corners)).max() <= 2
     assert np.abs(corners[0][:3] - 255 * studio()[3, 3]).max() <= 2
 

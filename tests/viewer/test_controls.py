@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from facefolds_core.asset import read_asset
-from tests.viewer.conftest import NewPlayer, Player, page_of_yours, touching
+from tests.viewer.conftest import NewPlayer, Player, Show, page_of_yours, touching
 
 
 @pytest.fixture
@@ -26,7 +26,7 @@ def value(player: Player, expression: str) -> object:
 
 def changes_picture(player: Player, act: object) -> bool:
     before = player.capture()
-    act()  # type: ignore[operator]
+    act()
     return bool(np.abs(player.capture() - before).max() > 0.02)
 
 
@@ -108,13 +108,11 @@ def test_keys_turn_and_zoom(player: Player) -> None:
     for key in ("Shift+ArrowRight", "Shift+ArrowUp", "-"):
         player.page.keyboard.press(key)
     after = value(player, "e.player.view.get()")
-    assert isinstance(before, dict) and isinstance(after, dict)
     assert after["azimuth"] == pytest.approx(before["azimuth"] + 5)
     assert after["elevation"] == pytest.approx(before["elevation"] + 5)
     assert after["distance"] == pytest.approx(1.1 * before["distance"])
     player.page.keyboard.press("0")
     again = value(player, "e.player.view.get()")
-    assert isinstance(again, dict)
     assert [again["azimuth"], again["distance"]] == pytest.approx([before["azimuth"], before["distance"]])
 
 
@@ -123,9 +121,9 @@ def test_orbit_pan_and_zoom_by_pointer(player: Player) -> None:
 
     def drag(button: str) -> None:
         mouse.move(400, 300)
-        mouse.down(button=button)  # type: ignore[arg-type]
+        mouse.down(button=button)
         mouse.move(480, 330, steps=4)
-        mouse.up(button=button)  # type: ignore[arg-type]
+        mouse.up(button=button)
 
     drag("left")
     player.wait("Math.abs(e.player.view.get().azimuth) > 5")
@@ -136,9 +134,8 @@ def test_orbit_pan_and_zoom_by_pointer(player: Player) -> None:
     player.wait(f"e.player.view.get().distance < {before}")
 
 
-def test_touch_turns(new_player: NewPlayer, rich: Path) -> None:
-    player = new_player({"asset": rich}, viewport={"width": 390, "height": 700}, has_touch=True, is_mobile=True)
-    player.open("asset")
+def test_touch_turns(show: Show) -> None:
+    player = show(viewport={"width": 390, "height": 700}, has_touch=True, is_mobile=True)
     touch = touching(player)
     touch("touchStart", (200, 250))
     for x in (180, 150, 120):
@@ -184,7 +181,6 @@ def test_background_detail_and_statistics(player: Player, rich: Path) -> None:
     for word in ("Pictures a second", "Triangles", "Loaded", "GPU memory, computed", "WebCodecs"):
         assert word in text
     statistics = value(player, "e.statistics")
-    assert isinstance(statistics, dict)
     coarse = read_asset(rich).levels[0]
     assert statistics["triangles"] == sum(len(layer.faces) for layer in coarse.layers)
     width, height = statistics["texture"]

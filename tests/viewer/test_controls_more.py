@@ -15,13 +15,12 @@ from PIL import Image
 from facefolds_core.asset import read_asset
 from facefolds_core.rendering.pixels import render
 from tests.pictures import five_cameras, psnr
-from tests.viewer.conftest import NewPlayer, Player, page_of_yours
+from tests.viewer.conftest import NewPlayer, Player, Show, page_of_yours
 
 
 @pytest.fixture
-def player(new_player: NewPlayer, rich: Path) -> Player:
-    player = new_player({"asset": rich}, viewport={"width": 760, "height": 500})
-    player.open("asset", full=True)
+def player(show: Show) -> Player:
+    player = show(full=True, viewport={"width": 760, "height": 500})
     return player
 
 
@@ -77,7 +76,7 @@ def test_a_turn_is_recorded(player: Player, tmp_path: Path) -> None:
         const text = await new Promise((done) => {
             const reader = new FileReader(); reader.onload = () => done(reader.result); reader.readAsDataURL(film); });
         return [film.type, text.split(',')[1]];"""
-    kind, data = player.run(code)  # type: ignore[misc]
+    kind, data = player.run(code)
     assert kind in ("video/mp4", "video/webm")
     (tmp_path / "turn").write_bytes(base64.b64decode(data))
     pictures, seconds, sound = film_of(tmp_path / "turn")
@@ -155,9 +154,8 @@ def test_the_code_to_embed_from_a_server_has_its_address_and_what_it_must_allow(
     assert not player.page.get_by_label("One file").is_visible()
 
 
-def test_rows_of_the_settings_go_under_their_title(new_player: NewPlayer, rich: Path) -> None:
-    player = new_player({"asset": rich}, viewport={"width": 390, "height": 700})
-    player.open("asset", "frame=0&background=%23ffffff")
+def test_rows_of_the_settings_go_under_their_title(show: Show) -> None:
+    player = show("frame=0&background=%23ffffff", viewport={"width": 390, "height": 700})
     player.button("Settings")
     box = player.page.locator(".panel .head").bounding_box()
     assert box
@@ -167,9 +165,8 @@ def test_rows_of_the_settings_go_under_their_title(new_player: NewPlayer, rich: 
     assert player.page.screenshot(clip=title) == before
 
 
-def test_backgrounds_stand_in_one_row(new_player: NewPlayer, rich: Path) -> None:
-    player = new_player({"asset": rich})
-    player.open("asset")
+def test_backgrounds_stand_in_one_row(show: Show) -> None:
+    player = show()
     for width in (390, 760):
         player.page.set_viewport_size({"width": width, "height": 600})
         if not player.page.locator(".panel").is_visible():
@@ -180,9 +177,8 @@ def test_backgrounds_stand_in_one_row(new_player: NewPlayer, rich: Path) -> None
         assert min(min(size[1:]) for size in sizes) >= 24  # for fingers
 
 
-def test_words_and_figures_fit_a_small_player(new_player: NewPlayer, rich: Path) -> None:
-    player = new_player({"asset": rich}, viewport={"width": 360, "height": 240})
-    player.open("asset")
+def test_words_and_figures_fit_a_small_player(show: Show) -> None:
+    player = show(viewport={"width": 360, "height": 240})
     player.run("e.overlays.say('Cameras saw too little from further round'); e.overlays.showStatistics(true)")
     toast, stats, bar = (player.page.locator(name).bounding_box() for name in (".toast", ".stats", ".bar"))
     assert toast and stats and bar
@@ -209,9 +205,8 @@ def test_the_bar_goes_while_it_plays_and_comes_back(player: Player) -> None:
 
 
 @pytest.mark.parametrize("size", [pytest.param((280, 160), marks=pytest.mark.nightly), (240, 320)])
-def test_a_small_player_has_what_it_needs_in_one_line(new_player: NewPlayer, rich: Path, size: tuple[int, int]) -> None:
-    player = new_player({"asset": rich}, viewport={"width": size[0], "height": size[1]})
-    player.open("asset")
+def test_a_small_player_has_what_it_needs_in_one_line(show: Show, size: tuple[int, int]) -> None:
+    player = show(viewport={"width": size[0], "height": size[1]})
     boxes = [button.bounding_box() for button in player.page.locator(".bar button:visible").all()]
     assert len(boxes) == 3
     assert all(box and box["x"] >= 0 and box["x"] + box["width"] <= size[0] for box in boxes)

@@ -10,7 +10,7 @@ from urllib.parse import urlsplit
 import numpy as np
 import pytest
 
-from tests.viewer.conftest import PATIENCE, NewPlayer, Player, page_of_yours, touching
+from tests.viewer.conftest import PATIENCE, NewPlayer, Player, Show, page_of_yours, touching
 
 COUNT_FRAMES = """window.frames_asked = 0; const ask = requestAnimationFrame.bind(window);
     window.requestAnimationFrame = (act) => { ++window.frames_asked; return ask(act); };"""
@@ -63,7 +63,7 @@ def test_a_part_of_the_state_changes_that_part(new_player: NewPlayer, rich: Path
         player.wait("e.ready")
     player.run("e.state = {view: {azimuth: 40}}; e.state = {view: {elevation: 5}}")
     player.wait("e.ready")
-    view, home = player.run("return [e.state.view, e.player.view.home]")  # type: ignore[misc]
+    view, home = player.run("return [e.state.view, e.player.view.home]")
     assert [view["azimuth"], view["elevation"]] == [40, 5]
     assert [view["distance"], view["target"]] == [pytest.approx(home["distance"]), pytest.approx(home["target"])]
     assert player.run("try { e.state = {view: {azimuth: 'x'}} } catch (error) { return error.name }") == "TypeError"
@@ -210,7 +210,6 @@ def test_what_it_shows_is_kept_when_it_is_moved(new_player: NewPlayer, rich: Pat
     player.run("const other = e.parentElement; e.remove(); await 0; other.append(e)")
     player.wait("e.ready && e.frame === 3")
     view = player.run("return e.player.view.get()")
-    assert isinstance(view, dict)
     assert view["azimuth"] == pytest.approx(30)
     assert player.run("return e.spread") == 0.5
 
@@ -242,11 +241,10 @@ def test_many_sizes_do_not_disturb_each_other(new_player: NewPlayer, rich: Path)
     assert difference <= 1
 
 
-def test_a_folder_without_an_address_plays(new_player: NewPlayer, rich: Path, tmp_path: Path) -> None:
+def test_a_folder_without_an_address_plays(show: Show, rich: Path, tmp_path: Path) -> None:
     """A ZIP that is dropped on the page."""
     archive = Path(shutil.make_archive(str(tmp_path / "asset"), "zip", rich.parent, rich.name))
-    player = new_player({"asset": rich})
-    player.open("asset", full=True)
+    player = show(full=True)
     code = """const bytes = Uint8Array.from(atob(v), (sign) => sign.charCodeAt(0)); const transfer = new DataTransfer();
         transfer.items.add(new File([bytes], 'asset.zip')); window.before = e.player;
         dispatchEvent(new DragEvent('drop', { dataTransfer: transfer, cancelable: true, bubbles: true }));"""

@@ -58,8 +58,7 @@ def test_without_webgl2(new_player: NewPlayer, asset: Path) -> None:
 @pytest.mark.parametrize("script", ["", NO_WEBGL], ids=["loading", "no WebGL"])
 def test_a_poster_of_the_pages_own(new_player: NewPlayer, asset: Path, script: str) -> None:
     player = new_player({"asset": asset}, script=script)
-    held: list = []
-    player.page.route("**/*.mp4", lambda route: held.append(route))
+    release = player.hold("**/*.mp4")
     page_of_yours(
         player,
         '<facefolds-player src="asset/" poster="asset/photo0.png" alt="Ann" style="height:300px"></facefolds-player>',
@@ -71,9 +70,7 @@ def test_a_poster_of_the_pages_own(new_player: NewPlayer, asset: Path, script: s
     if script:
         player.page.get_by_role("img", name="Ann").wait_for()
         return
-    while not held:
-        player.page.wait_for_timeout(20)
-    held[0].continue_()
+    release()
     player.wait("e.ready")
     player.wait("e.shadowRoot.querySelector('.poster').matches('.gone')")
 
@@ -158,7 +155,7 @@ def spoil_codec(asset: Path) -> str:
     ids=lambda f: f.__name__[6:],
 )
 def test_a_file_that_is_missing_or_damaged(new_player: NewPlayer, one_level: Path, spoil: object) -> None:
-    said = spoil(one_level)  # type: ignore[operator]
+    said = spoil(one_level)
     player = new_player({"asset": one_level}, allow=(NOT_FOUND,))
     player.open("asset", wait=False)
     text = player.message()

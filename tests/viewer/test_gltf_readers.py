@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,19 +11,17 @@ import pytest
 from numpy.typing import NDArray
 from playwright.sync_api import Browser
 
-from facefolds_core.asset import Asset, read_asset
+from facefolds_core.asset import Asset
 from facefolds_core.asset.glb import container
 from facefolds_core.asset.gltf.extension import NAME
 from facefolds_core.asset.gltf.writing import write_layered
 from facefolds_core.cli.export import export
 from facefolds_core.geometry.cameras import Camera
-from facefolds_core.geometry.track import Track
 from facefolds_core.rendering.pixels import render
-from tests.assets import SOURCE, make_asset
-from tests.geometry.test_track import SHIFTS, TURNS
+from tests.assets import make_asset
 from tests.gltf_files import opened
 from tests.pictures import GREY_VALUE, expected_means, five_cameras, psnr
-from tests.viewer.fixtures import add_reflection, rich_asset
+from tests.viewer.fixtures import moving_asset
 from tests.viewer.gltf_viewers import GltfViewer, build, page_with, pictures
 
 SIZE, FRAME = 96, 2
@@ -41,13 +38,12 @@ def reader(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFact
     return folder
 
 
-def exported(folder: Path, moving: bool = False, glossy: bool = False) -> tuple[Asset, Path]:
+def exported(folder: Path, moving: bool = False) -> tuple[Asset, Path]:
     """An asset, and its GLB."""
-    source = replace(SOURCE, track=Track.of(TURNS, SHIFTS)) if moving else SOURCE
-    make_asset(folder / "asset", layers=4, frames=3, resolution=96, source=source)
-    if glossy:
-        add_reflection(folder / "asset")
-    asset = read_asset(folder / "asset")
+    if moving:
+        asset = moving_asset(folder / "asset", layers=4, resolution=96)
+    else:
+        asset = make_asset(folder / "asset", layers=4, frames=3, resolution=96)
     write_layered(folder / "face.glb", asset.full, "caps")
     return asset, folder / "face.glb"
 
@@ -68,7 +64,7 @@ def test_five_views_agree_with_the_reference(browser: Browser, reader: Path, tmp
 
 
 def test_a_head_that_moves_in_the_light_of_its_room(browser: Browser, reader: Path, tmp_path: Path) -> None:
-    asset, glb = exported(tmp_path, moving=True, glossy=True)
+    asset, glb = exported(tmp_path, moving=True)
     cameras = five_cameras(SIZE)[:2]
     for name, picture in shown(browser, reader, glb, cameras).items():
         camera = next(camera for camera in cameras if camera.name == name)
@@ -82,8 +78,8 @@ def test_the_video_plays(browser: Browser, reader: Path, tmp_path: Path) -> None
         assert sorted(page.evaluate("play('head.glb')")) == [0, 1, 2]
 
 
-def test_its_sound_is_heard_with_it(browser: Browser, reader: Path, tmp_path: Path) -> None:
-    export("gltf", rich_asset(tmp_path / "asset"), tmp_path / "face.glb", None)
+def test_its_sound_is_heard_with_it(browser: Browser, reader: Path, rich: Path, tmp_path: Path) -> None:
+    export("gltf", rich, tmp_path / "face.glb", None)
     with page_with(browser, reader, tmp_path / "face.glb") as page:
         assert page.evaluate("sound('head.glb')") > 0
 

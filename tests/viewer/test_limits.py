@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tests.assets import PLAIN, SOURCE, cap_mesh, cap_texture, write_asset, write_store
-from tests.viewer.conftest import NewPlayer, Player
+from tests.viewer.conftest import NewPlayer, Player, Show
 from tests.viewer.fixtures import change_manifest
 
 FILMED = {"azimuth": [-30, 40], "elevation": [-10, 20]}
@@ -42,7 +42,6 @@ def test_a_drag_beyond_what_is_good_meets_resistance_fades_and_comes_back(player
 def test_a_link_beyond_what_is_good_shows_the_nearest_that_is(player: Player) -> None:
     player.run("e.state = { view: { azimuth: 170, elevation: 60, distance: 1, target: [0, 0, 0] } }")
     view = player.run("return e.player.view.get()")
-    assert isinstance(view, dict)
     assert [view["azimuth"], view["elevation"]] == pytest.approx([GOOD["azimuth"][1], GOOD["elevation"][1]])
 
 
@@ -52,7 +51,6 @@ def test_what_was_measured_bounds_the_view(new_player: NewPlayer, rich_copy: Pat
     player = new_player({"asset": rich_copy})
     player.open("asset")
     view = player.run("e.state = { view: { azimuth: -80, elevation: 60 } }; return e.player.view.get()")
-    assert isinstance(view, dict)
     assert [view["azimuth"], view["elevation"]] == pytest.approx([-29, 12])
 
 
@@ -163,7 +161,6 @@ def test_a_view_that_somebody_chose_stays_when_the_size_changes(player: Player) 
     player.page.set_viewport_size({"width": 400, "height": 640})
     player.wait("e.player.size[0] === 400")
     view = player.run("return e.player.view.get()")
-    assert isinstance(view, dict)
     assert [view["azimuth"], view["distance"]] == pytest.approx([20, 0.8])
 
 
@@ -182,9 +179,8 @@ def test_reset_brings_everything_back(player: Player) -> None:
     assert np.abs(player.capture() - before).max() <= 1 / 255
 
 
-def test_it_sways_until_somebody_touches_it(new_player: NewPlayer, rich: Path) -> None:
-    player = new_player({"asset": rich}, viewport={"width": 760, "height": 500})
-    player.open("asset", "")
+def test_it_sways_until_somebody_touches_it(show: Show) -> None:
+    player = show("", viewport={"width": 760, "height": 500})
     player.wait("e.playing && e.player.view.swaying > 0.5")
     player.page.mouse.move(300, 200)
     player.page.mouse.down()
@@ -193,10 +189,7 @@ def test_it_sways_until_somebody_touches_it(new_player: NewPlayer, rich: Path) -
 
 
 @pytest.mark.parametrize(("view", "options"), [("view=10,0,1,0,0,0", {}), ("", {"reduced_motion": "reduce"})])
-def test_a_chosen_view_and_reduced_motion_do_not_sway(
-    new_player: NewPlayer, rich: Path, view: str, options: dict
-) -> None:
-    player = new_player({"asset": rich}, **options)
-    player.open("asset", view)
+def test_a_chosen_view_and_reduced_motion_do_not_sway(show: Show, view: str, options: dict) -> None:
+    player = show(view, **options)
     player.page.wait_for_timeout(200)
     assert player.run("return e.player.view.swaying") == 0

@@ -8,7 +8,7 @@ import subprocess
 import tarfile
 from pathlib import Path
 
-from tests.viewer.conftest import NewPlayer
+from tests.viewer.conftest import Show
 
 
 def test_the_package_holds_the_player_and_its_types(project_root: Path, player_folder: Path, tmp_path: Path) -> None:
@@ -27,11 +27,10 @@ def test_the_package_holds_the_player_and_its_types(project_root: Path, player_f
     assert not any(name.endswith((".map", ".ts")) and name != "types.d.ts" for name in names)
 
 
-def test_the_types_name_what_the_element_has(new_player: NewPlayer, rich: Path, project_root: Path) -> None:
+def test_the_types_name_what_the_element_has(show: Show, project_root: Path) -> None:
     text = (project_root / "viewer" / "types.d.ts").read_text()
     body = text[text.index("class FacefoldsPlayer") : text.index("declare global")]
     members = set(re.findall(r"^  (?:readonly )?(\w+)[(:<?]", body, re.M)) - {"addEventListener"}
     assert len(members) > 25
-    player = new_player({"asset": rich})
-    player.open("asset")
+    player = show()
     assert player.run("return v.filter((name) => !(name in e))", sorted(members)) == []

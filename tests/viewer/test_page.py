@@ -8,7 +8,7 @@ import subprocess
 from pathlib import Path
 from urllib.parse import urlsplit
 
-from tests.viewer.conftest import NewPlayer
+from tests.viewer.conftest import NewPlayer, Show
 
 
 def test_the_coarse_level_comes_first_and_the_full_one_follows(new_player: NewPlayer, rich: Path) -> None:
@@ -27,58 +27,47 @@ def test_the_coarse_level_comes_first_and_the_full_one_follows(new_player: NewPl
 
 def test_a_poster_and_progress_are_shown_before_the_first_picture(new_player: NewPlayer, rich: Path) -> None:
     player = new_player({"asset": rich})
-    held: list = []
-    player.page.route("**/coarse.mp4", lambda route: held.append(route))
+    release = player.hold("**/coarse.mp4")
     player.open("asset", wait=False)
     player.page.locator(".poster").wait_for()
     assert player.page.get_by_role("progressbar").is_visible()
     assert player.page.get_by_text("Loading").is_visible()
-    while not held:  # the poster may come before the video is asked for
-        player.page.wait_for_timeout(20)
-    held[0].continue_()
+    release()
     player.wait("e.ready")
     assert not player.page.get_by_role("progressbar").is_visible()
 
 
 def test_progress_is_shown_before_the_script_is_there(new_player: NewPlayer, rich: Path) -> None:
     player = new_player({"asset": rich})
-    held: list = []
-    player.page.route("**/page.js", lambda route: held.append(route))
+    release = player.hold("**/page.js")
     player.page.goto(f"{player.address}?src=asset/", wait_until="commit")
     code = "getComputedStyle(document.querySelector('facefolds-player'), '::after').content"
     player.page.wait_for_function(f"() => document.querySelector('facefolds-player') && {code} === '\"Loading\"'")
-    while not held:
-        player.page.wait_for_timeout(20)
-    for route in held:
-        route.continue_()
+    release()
     player.wait("e.ready")
     assert player.page.evaluate(code) == "none"
 
 
-def test_all_requests_stay_on_the_server(new_player: NewPlayer, rich: Path) -> None:
-    player = new_player({"asset": rich})
-    player.open("asset", "")
+def test_all_requests_stay_on_the_server(show: Show) -> None:
+    player = show("")
     player.wait("e.level === 'full' && e.playing")
     hosts = {urlsplit(url).netloc for url in player.requests if not url.startswith(("blob:", "data:"))}
     assert hosts == {urlsplit(player.address).netloc}
 
 
-def test_reduced_motion_does_not_start_by_itself(new_player: NewPlayer, rich: Path) -> None:
-    player = new_player({"asset": rich}, reduced_motion="reduce")
-    player.open("asset", "")
+def test_reduced_motion_does_not_start_by_itself(show: Show) -> None:
+    player = show("", reduced_motion="reduce")
     assert player.run("return e.playing") is False
 
 
-def test_the_address_follows_the_view(new_player: NewPlayer, rich: Path) -> None:
-    player = new_player({"asset": rich})
-    player.open("asset")
+def test_the_address_follows_the_view(show: Show) -> None:
+    player = show()
     player.run("e.spread = 0.25; await e.step(2)")
     player.page.wait_for_function("() => location.hash.includes('spread=0.25') && location.hash.includes('frame=2')")
 
 
-def test_nonsense_in_the_address_is_left_out(new_player: NewPlayer, rich: Path) -> None:
-    player = new_player({"asset": rich})
-    player.open("asset", "view=a,b&frame=-3&level=../../x&background=zzz&speed=-1&hidden=x")
+def test_nonsense_in_the_address_is_left_out(show: Show) -> None:
+    player = show("view=a,b&frame=-3&level=../../x&background=zzz&speed=-1&hidden=x")
     assert player.run("return [e.frame >= 0, e.speed, e.background]") == [True, 1, "#16181d"]
 
 
@@ -100,19 +89,17 @@ def test_an_element_can_change_its_source_and_go(new_player: NewPlayer, rich: Pa
     assert player.run("const p = e.player; e.remove(); await 0; return [e.player, p.closed]") == [None, True]
 
 
-def test_a_phone_shows_all_its_buttons(new_player: NewPlayer, rich: Path) -> None:
-    player = new_player({"asset": rich}, viewport={"width": 360, "height": 640})
-    player.open("asset")
+def test_a_phone_shows_all_its_buttons(show: Show) -> None:
+    player = show(viewport={"width": 360, "height": 640})
     player.wait("e.player.sound !== null")
     boxes = [button.bounding_box() for button in player.page.locator(".bar button:visible").all()]
     assert len(boxes) >= 8
     assert all(box and box["x"] >= 0 and box["x"] + box["width"] <= 360 for box in boxes)
 
 
-def test_little_script_before_the_first_picture(new_player: NewPlayer, rich: Path, player_folder: Path) -> None:
+def test_little_script_before_the_first_picture(show: Show, player_folder: Path) -> None:
     """All that is fetched until there is a picture, compressed as servers do."""
-    player = new_player({"asset": rich})
-    player.open("asset")
+    player = show()
     names = {urlsplit(url).path.lstrip("/") for url in player.requests if url.startswith(player.address)}
     scripts = [name for name in names if name.endswith(".js")]
     assert "draco/worker.js" in scripts

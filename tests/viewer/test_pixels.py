@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import shutil
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,11 +16,10 @@ from facefolds_core.geometry.cameras import Camera
 from facefolds_core.rendering.areas import AreaView
 from facefolds_core.rendering.pixels import lit_hits, render
 from facefolds_core.rendering.raster import cast_layers
-from tests.asset.test_track import TRACK
-from tests.assets import SOURCE, make_asset
+from tests.assets import MOVING, make_asset
 from tests.pictures import GREY, GREY_VALUE, expected_means, expected_pictures, five_cameras, psnr
 from tests.viewer.conftest import NewPlayer
-from tests.viewer.fixtures import add_reflection
+from tests.viewer.fixtures import add_reflection, moving_asset
 
 SIZE = 160
 AGREE = 53.0
@@ -31,9 +29,7 @@ One ray a pixel: 45.0 and 42.4 at grazing angles."""
 
 @pytest.fixture(scope="module")
 def caps(tmp_path_factory: pytest.TempPathFactory) -> Asset:
-    folder = tmp_path_factory.mktemp("caps") / "asset"
-    make_asset(folder, layers=5, frames=6, resolution=96)
-    return read_asset(folder)
+    return make_asset(tmp_path_factory.mktemp("caps") / "asset", layers=5, frames=6, resolution=96)
 
 
 def check(new_player: NewPlayer, asset: Asset, size: int = SIZE, script: str = "") -> None:
@@ -151,8 +147,7 @@ def exposed(rgba: NDArray[np.generic], factor: float) -> NDArray[np.float32]:
 
 
 def test_a_head_that_moves_stands_where_it_stood(new_player: NewPlayer, tmp_path: Path) -> None:
-    make_asset(tmp_path / "asset", layers=3, frames=3, resolution=64, source=replace(SOURCE, track=TRACK))
-    asset = read_asset(tmp_path / "asset")
+    asset = make_asset(tmp_path / "asset", layers=3, frames=3, resolution=64, source=MOVING)
     player = new_player({"asset": asset.folder})
     player.open("asset")
     player.run("e.background = v; e.effects = false", GREY)
@@ -168,9 +163,7 @@ def test_a_head_that_moves_stands_where_it_stood(new_player: NewPlayer, tmp_path
 
 def test_the_light_stays_with_the_room_where_the_head_turns(new_player: NewPlayer, tmp_path: Path) -> None:
     """Also where the head is held still: the room turns around it."""
-    make_asset(tmp_path / "asset", layers=3, frames=3, resolution=64, source=replace(SOURCE, track=TRACK))
-    add_reflection(tmp_path / "asset")
-    asset, camera = read_asset(tmp_path / "asset"), five_cameras(SIZE)[1]
+    asset, camera = moving_asset(tmp_path / "asset", layers=3, resolution=64), five_cameras(SIZE)[1]
     assert asset.reflection() is not None and asset.track is not None
     player = new_player({"asset": asset.folder})
     player.open("asset")

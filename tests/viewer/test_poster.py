@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import re
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -43,14 +44,12 @@ def seen(player: Player) -> NDArray[np.float64]:
     return np.asarray(Image.open(io.BytesIO(data)).convert("RGB")) / 255
 
 
-def waiting(new_player: NewPlayer, asset: Path, view: str, **options: object) -> tuple[Player, list]:
-    """A player whose video is held back."""
-    player, held = new_player({"asset": asset}, **options), []
-    player.page.route("**/*.mp4", lambda route: held.append(route))
+def waiting(new_player: NewPlayer, asset: Path, view: str, **options: object) -> tuple[Player, Callable[[], None]]:
+    """A player whose video is held back, and what lets go of it."""
+    player = new_player({"asset": asset}, **options)
+    release = player.hold("**/*.mp4")
     player.open("asset", view, wait=False)
-    while not held:
-        player.page.wait_for_timeout(20)
-    return player, held
+    return player, release
 
 
 @pytest.mark.parametrize(
@@ -58,11 +57,11 @@ def waiting(new_player: NewPlayer, asset: Path, view: str, **options: object) ->
 )
 def test_the_first_picture_is_the_poster(new_player: NewPlayer, asset: Path, size: tuple[int, int]) -> None:
     viewport = {"width": size[0], "height": size[1]}
-    player, held = waiting(new_player, asset, "frame=0", viewport=viewport)
+    player, release = waiting(new_player, asset, "frame=0", viewport=viewport)
     player.page.locator(".poster").wait_for()
     before = seen(player)
     assert player.run("return e.ready") is False
-    held[0].continue_()
+    release()
     player.wait("e.ready")
     after = seen(player)
     assert np.ptp(before, axis=(0, 1)).max() > 0.3  # there is something to be seen
@@ -78,10 +77,10 @@ def test_the_first_picture_is_the_poster(new_player: NewPlayer, asset: Path, siz
     ],
 )
 def test_a_poster_that_shows_something_else_is_not_shown(new_player: NewPlayer, asset: Path, view: str) -> None:
-    player, held = waiting(new_player, asset, view)
+    player, release = waiting(new_player, asset, view)
     player.page.wait_for_timeout(300)
     assert not player.page.locator(".poster").is_visible()
-    held[0].continue_()
+    release()
     player.wait("e.ready")
 
 
@@ -89,7 +88,7 @@ def test_both_know_of_the_same_camera_and_colour(project_root: Path) -> None:
     source = project_root / "viewer" / "src"
     view = (source / "view.js").read_text()
     attributes = (source / "attributes.js").read_text()
-    assert float(re.search(r"FIELD_OF_VIEW = ([\d.]+)", attributes)[1]) == FIELD_OF_VIEW  # type: ignore[index]
-    assert float(re.search(r"FILLED = ([\d.]+)", view)[1]) == FILLED  # type: ignore[index]
+    assert float(re.search(r"FIELD_OF_VIEW = ([\d.]+)", attributes)[1]) == FIELD_OF_VIEW
+    assert float(re.search(r"FILLED = ([\d.]+)", view)[1]) == FILLED
     colour = re.search(r'BACKGROUND = "#(\w{6})"', (source / "element.js").read_text())
     assert colour is not None and tuple(round(255 * value) for value in BACKGROUND) == tuple(bytes.fromhex(colour[1]))

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.viewer.conftest import NewPlayer, Player, page_of_yours
+from tests.viewer.conftest import NewPlayer, Player, Show, page_of_yours
 
 CONTRAST = """
 const numbers = (colour) => {
@@ -40,9 +40,8 @@ NEIGHBOURS = (("#16181d", DARK), ("#ffffff", WHITE), ("transparent", WHITE))
 
 
 @pytest.fixture
-def player(new_player: NewPlayer, rich: Path) -> Player:
-    player = new_player({"asset": rich}, viewport={"width": 900, "height": 700})
-    player.open("asset", full=True)
+def player(show: Show) -> Player:
+    player = show(full=True, viewport={"width": 900, "height": 700})
     return player
 
 
@@ -62,7 +61,7 @@ def test_all_words_have_the_contrast_that_wcag_asks_for(
     player.run("e.background = v", ground)
     player.button("Settings")
     player.page.get_by_text("Keys").click()
-    found: list[tuple[str, float]] = player.run(CONTRAST, list(behind))  # type: ignore[assignment]
+    found: list[tuple[str, float]] = player.run(CONTRAST, list(behind))
     assert len(found) > 30 and (dict(found).keys() >= {"caps"}) is (ground == "transparent")
     assert [(words, round(ratio, 1)) for words, ratio in found if ratio < 4.5] == []
 
@@ -86,7 +85,7 @@ def test_the_controls_have_the_colours_of_what_is_behind(
     page_of_yours(player, style + body)
     player.wait("e.ready")
     words = "return getComputedStyle(e.shadowRoot.querySelector('.title')).color.match(/\\d+/g).map(Number)"
-    assert (max(player.run(words)) < 100) is light  # type: ignore[call-overload]
+    assert (max(player.run(words)) < 100) is light
     bar = player.page.locator(".bar").bounding_box()
     assert bar and 300 - bar["y"] < 45  # of 300 pixels
     track = "return getComputedStyle(e.shadowRoot.querySelector('[data-do=settings]')).accentColor"
@@ -148,14 +147,12 @@ def test_layers_that_are_pulled_apart_are_seen_from_aside_and_fill_the_canvas(
 def test_the_progress_counts_the_decoder(new_player: NewPlayer, rich: Path) -> None:
     """A decoder that is still under way is part of what is loaded."""
     player = new_player({"asset": rich})
-    held: list = []
-    player.page.route("**/*.wasm", lambda route: held.append(route))
+    release = player.hold("**/*.wasm")
     player.open("asset", wait=False)
     bar = player.page.get_by_role("progressbar")
     bar.wait_for()
     player.page.wait_for_timeout(1000)  # all else is there
     shown = int(bar.get_attribute("aria-valuenow") or 0)
     assert 0 < shown < 90
-    for route in held:
-        route.continue_()
+    release()
     player.wait("e.ready")

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from playwright.sync_api import Route
 
 from facefolds_core.asset import read_asset
 from facefolds_core.geometry.sphere_uv import uv_to_st
-from tests.asset.test_track import TRACK
-from tests.assets import SOURCE, make_asset
+from tests.assets import MOVING, TRACK, make_asset
 from tests.viewer.conftest import NewPlayer, Player, page_of_yours
 
 PLACE = (0.12, -0.1)
@@ -66,7 +63,7 @@ def test_a_hotspot_stands_at_its_place_from_every_side(new_player: NewPlayer, ri
 def test_a_hotspot_follows_a_head_that_moves(new_player: NewPlayer, tmp_path: Path) -> None:
     """From frame to frame, as it plays, and back to rest where the head is held still."""
     asset = tmp_path / "asset"
-    make_asset(asset, layers=3, frames=3, resolution=64, source=replace(SOURCE, track=TRACK))
+    make_asset(asset, layers=3, frames=3, resolution=64, source=MOVING)
     player = opened(new_player, asset, HOTSPOT, 'loop="false"')
     point = point_of(asset)
     places = [place_of(player, TRACK.at(frame).apply(point)) for frame in range(3)]
@@ -110,17 +107,14 @@ def test_the_surface_under_a_point_gives_a_hotspot_there(new_player: NewPlayer, 
 
 def test_a_poster_and_a_bar_of_the_page_go_when_there_is_a_picture(new_player: NewPlayer, rich: Path) -> None:
     player = new_player({"asset": rich}, viewport={"width": 400, "height": 300})
-    held: list[Route] = []
-    player.page.route("**/manifest.json", lambda route: held.append(route))
+    release = player.hold("**/manifest.json")
     inner = '<p slot="poster" id="poster">Wait</p><p slot="progress-bar" id="bar">Coming</p>'
     page_of_yours(player, f'<facefolds-player src="asset/" style="height: 300px">{inner}</facefolds-player>')
     bar, poster = player.page.locator("#bar"), player.page.locator("#poster")
     bar.wait_for(state="visible")
     assert poster.is_visible()
     assert not player.run("return e.shadowRoot.querySelector('.spinner').checkVisibility()")
-    while not held:
-        player.page.wait_for_timeout(50)
-    held[0].continue_()
+    release()
     player.wait("e.ready")
     assert not bar.is_visible()
     player.page.wait_for_function("() => getComputedStyle(document.querySelector('#poster')).opacity === '0'")

@@ -101,7 +101,7 @@ def test_no_wrong_frame_while_levels_change(
     player = opened(new_player({"asset": take}))
     size = {"width": CAMERA.width, "height": CAMERA.height}
     seen = player.run(RECORD, {"K": CAMERA.K.tolist(), "w2c": CAMERA.w2c.tolist(), **size})
-    assert isinstance(seen, list) and {level for _, level, _ in seen} == {"small", "full"} and len(seen) > 10
+    assert {level for _, level, _ in seen} == {"small", "full"} and len(seen) > 10
     for frame, level, text in seen:
         picture = np.frombuffer(base64.b64decode(text), np.uint8).reshape(CAMERA.height, CAMERA.width, 4)[..., :3] / 255
         assert shows(picture, pictures[level], frame), (frame, level)
@@ -121,7 +121,6 @@ def test_playing_goes_over_the_borders_of_segments_and_round(new_player: NewPlay
         e.pause();
         return seen;"""
     )
-    assert isinstance(seen, list)
     steps = (np.diff(seen[:-1]) + FRAMES) % FRAMES
     assert steps.max() < 12
     assert max(seen) > 36

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.viewer.conftest import NewPlayer
+from tests.viewer.conftest import Show
 
 EMULATOR = """import { XRDevice, metaQuest3 } from "iwer";
 window.headset = new XRDevice(metaQuest3);
@@ -49,11 +49,10 @@ def headset(tmp_path_factory: pytest.TempPathFactory, project_root: Path, player
     return (folder / "out.js").read_text()
 
 
-def test_each_eye_has_its_picture_with_the_right_disparity(new_player: NewPlayer, rich: Path, headset: str) -> None:
-    player = new_player({"asset": rich}, script=headset, viewport={"width": 800, "height": 400})
-    player.open("asset")
+def test_each_eye_has_its_picture_with_the_right_disparity(show: Show, headset: str) -> None:
+    player = show(script=headset, viewport={"width": 800, "height": 400})
     player.wait("e.level === 'full' && !e.shadowRoot.querySelector('[data-do=\"vr\"]').hidden")
-    (left, right), immersed = player.run(LOOK)  # type: ignore[misc]
+    (left, right), immersed = player.run(LOOK)
     assert immersed is False
     assert left["rect"] != right["rect"]
     assert right["x"] - left["x"] == pytest.approx(-0.064, abs=1e-3)  # the right eye sees the head further left
@@ -95,13 +94,10 @@ ROOM = """
     return { offered, before, aside, moved, immersed: e.player.immersed };"""
 
 
-def test_in_the_room_the_head_stands_where_one_looks_with_nothing_behind_it(
-    new_player: NewPlayer, rich: Path, headset: str
-) -> None:
-    player = new_player({"asset": rich}, script=headset, viewport={"width": 800, "height": 400})
-    player.open("asset")
+def test_in_the_room_the_head_stands_where_one_looks_with_nothing_behind_it(show: Show, headset: str) -> None:
+    player = show(script=headset, viewport={"width": 800, "height": 400})
     player.wait("e.level === 'full' && e.canActivateAR")
-    seen: dict = player.run(ROOM)  # type: ignore[assignment]
+    seen: dict = player.run(ROOM)
     assert seen["offered"] is True and seen["immersed"] is False
     assert seen["before"]["corner"] == [0, 0, 0, 0]
     assert seen["before"]["inner"] > 0.01
@@ -109,8 +105,7 @@ def test_in_the_room_the_head_stands_where_one_looks_with_nothing_behind_it(
     assert seen["moved"]["inner"] == pytest.approx(seen["before"]["inner"], rel=0.05)
 
 
-def test_without_a_headset_nothing_is_offered(new_player: NewPlayer, rich: Path) -> None:
-    player = new_player({"asset": rich})
-    player.open("asset")
+def test_without_a_headset_nothing_is_offered(show: Show) -> None:
+    player = show()
     assert player.run("return e.canActivateAR") is False
     assert not player.page.get_by_role("button", name="Place it in your room").is_visible()

@@ -7,7 +7,7 @@ starts a closed group of pictures.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import TYPE_CHECKING, Literal, Protocol
@@ -85,23 +85,10 @@ class Codec:
         return min(self.worst_crf, max(1, round(self.crf_scale * x264_crf + self.crf_offset)))
 
 
-class _Codecs(Mapping[str, Codec]):
-    """Name -> codec, of all in this package."""
-
-    def __getitem__(self, name: str) -> Codec:
-        codec: Codec = registry.CODECS[name].CODEC
-        return codec
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(registry.CODECS.names)
-
-    def __len__(self) -> int:
-        return len(registry.CODECS.names)
-
-
-CODECS = _Codecs()
-
-
 def joined(**options: object) -> str:
     """Options as x264 and SVT-AV1 take them: "a=1:b=2"."""
     return ":".join(f"{key}={value}" for key, value in options.items())
+
+
+CODECS: dict[str, Codec] = {name: registry.CODECS[name].CODEC for name in registry.CODECS.names}
+"""Name -> codec, of all modules of this package; last here, since they import what stands above."""

@@ -63,7 +63,7 @@ def check_glb(path: Path) -> list[str]:
         OSError: if the file cannot be read.
     """
     try:
-        glb = Glb.read(path)
+        glb = Glb(path.read_bytes())
     except GlbError as problem:
         return [str(problem)]
     except ValidationError as error:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import struct
-from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar
 
 import numpy as np
@@ -201,11 +200,6 @@ class Glb:
     def __init__(self, data: bytes) -> None:
         text, self.binary = chunks(data)
         self.gltf = Gltf.model_validate_json(text)
-
-    @classmethod
-    def read(cls, path: Path) -> Glb:
-        """Of a file. Raises as the class, and OSError."""
-        return cls(path.read_bytes())
 
     def view(self, index: int, place: str) -> bytes:
         """The bytes of a buffer view.

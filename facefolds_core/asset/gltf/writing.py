@@ -7,41 +7,39 @@ decode, are the asset's own Draco meshes: bytes compared in docs/research/engine
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from hashlib import sha256
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
+import av
 import numpy as np
 from numpy.typing import NDArray
 
+from facefolds_core.asset.audio import AAC_MIME, encode_sound
 from facefolds_core.asset.draco import attribute_ids
 from facefolds_core.asset.glb import (
     ARRAY_BUFFER,
     ELEMENT_ARRAY_BUFFER,
     FLOAT,
-    SAMPLER,
-    TO_Y_UP,
     UNLIT,
     UNSIGNED_INT,
     Builder,
     Triangles,
-    container,
-    materials,
     picture_of,
     png,
     pose_of,
     triangles_of,
+    write_document,
 )
 from facefolds_core.asset.gltf.extension import DRACO, NAME, TEXTURE_VIDEO, Checksum, LayeredVideo, Reflection
-from facefolds_core.asset.gltf.sound import mime_with_sound, with_sound
 from facefolds_core.asset.manifest import Video
 from facefolds_core.asset.manifest_base import StoredFile
 from facefolds_core.asset.manifest_extras import Audio
 from facefolds_core.asset.opaque import opaque_where_covered
 from facefolds_core.asset.reader import AssetLevel, layer_bytes
 from facefolds_core.asset.stored import read_slice
-from facefolds_core.files.writing import atomic_file
+from facefolds_core.asset.streams import copy_packets
 from facefolds_core.geometry.reflections import window_to_window
 from facefolds_core.geometry.track import Track
 
@@ -87,34 +85,25 @@ def write_layered(
         images.append(_image(builder, "reflection", _stored(level, maps)))
         document_textures.append({"source": 1, "sampler": 0})
     node: dict[str, Any] = {"name": "layers", "mesh": STILL}
-    animations = []
+    moved = {}
     if level.track is not None:
         node |= pose_of(level.track, still)
-        animations.append(_animation(builder, level.track, level.entry.texture.fps))
+        moved = {"animations": [_animation(builder, level.track, level.entry.texture.fps)]}
     videos = [_video(builder, level, sound)]
     said = _said(level, still).model_copy(update={"checksums": _checksums(builder)})
     node["extensions"] = {NAME: said.model_dump(mode="json", exclude_none=True)}
-    document = {
-        "asset": {"version": "2.0", "generator": "facefolds"},
-        "extensionsUsed": [UNLIT, DRACO, TEXTURE_VIDEO, NAME],
-        "scene": 0,
-        "scenes": [{"nodes": [1]}],
-        "nodes": [node, {"name": name, "rotation": TO_Y_UP, "children": [0]}],
-        "meshes": meshes,
-        "materials": materials(),
-        "textures": document_textures,
-        "images": images,
-        "samplers": [SAMPLER],
-        **({"animations": animations} if animations else {}),
-        "accessors": builder.accessors,
-        "bufferViews": builder.views,
-        "buffers": [{"byteLength": len(builder.binary)}],
-        "extensions": {TEXTURE_VIDEO: {"videos": videos}},
-    }
-    data = container(document, bytes(builder.binary))
-    with atomic_file(path) as temporary:
-        temporary.write_bytes(data)
-    return len(data)
+    return write_document(
+        path,
+        name,
+        builder,
+        [node],
+        extensionsUsed=[UNLIT, DRACO, TEXTURE_VIDEO, NAME],
+        meshes=meshes,
+        textures=document_textures,
+        images=images,
+        extensions={TEXTURE_VIDEO: {"videos": videos}},
+        **moved,
+    )
 
 
 def _checksums(builder: Builder) -> tuple[Checksum, ...]:
@@ -125,14 +114,32 @@ def _checksums(builder: Builder) -> tuple[Checksum, ...]:
 
 def _video(builder: Builder, level: AssetLevel, sound: Audio | None) -> dict[str, Any]:
     """The entry of the video, with the sound in it."""
-    video, texture = _chosen(level.entry.texture.videos), level.entry.texture
+    texture = level.entry.texture
+    video = next((one for one in texture.videos if one.codec == PLAYS_ANYWHERE), texture.videos[0])
     data = _stored(level, video)
     if sound is None:
         return {"bufferView": builder.view(data), "mimeType": video.mime}
     _stored(level, sound)
-    files = level.folder / video.file, level.folder / sound.file
-    data = with_sound(*files, sound.mime, texture.frames / texture.fps)
-    return {"bufferView": builder.view(data), "mimeType": mime_with_sound(video.mime)}
+    codec, heard = (mime.partition('codecs="')[2].rstrip('"') for mime in (video.mime, AAC_MIME))
+    mime = f'video/mp4; codecs="{codec}, {heard}"'
+    return {"bufferView": builder.view(_with_sound(level, video, sound)), "mimeType": mime}
+
+
+def _with_sound(level: AssetLevel, video: Video, sound: Audio) -> bytes:
+    """An MP4 with the pictures as they are, and the sound, as it is if it is AAC: readers play them in step.
+
+    Raises:
+        UserError: if the sound cannot be read.
+    """
+    texture, heard = level.entry.texture, level.folder / sound.file
+    with TemporaryDirectory() as folder:
+        encoded, joined = (Path(folder) / name for name in ("sound.mp4", "joined.mp4"))
+        if sound.mime != AAC_MIME:
+            encode_sound(encoded, heard, texture.frames / texture.fps)
+            heard = encoded
+        with av.open(str(joined), "w", format="mp4", options={"fflags": "bitexact", "movflags": "faststart"}) as made:
+            copy_packets(made, [level.folder / video.file, heard], texture.rate)
+        return joined.read_bytes()
 
 
 def _said(level: AssetLevel, still: int) -> LayeredVideo:
@@ -214,15 +221,10 @@ def _shares(builder: Builder, st: NDArray[np.float64]) -> int:
 
 def _animation(builder: Builder, track: Track, fps: float) -> dict[str, Any]:
     """The poses at the times of the pictures, of node 0."""
-
-    def numbers(kind: str, values: NDArray[np.float64], bounds: bool = False) -> int:
-        stored = values.astype("<f4")
-        return builder.accessor(kind, FLOAT, stored, builder.view(stored.tobytes()), bounds)
-
-    times = numbers("SCALAR", np.arange(len(track)) / fps, bounds=True)
+    times = builder.array("SCALAR", np.arange(len(track)) / fps, bounds=True, target=None)
     parts = {
-        "rotation": numbers("VEC4", track.quaternions[:, [1, 2, 3, 0]]),
-        "translation": numbers("VEC3", track.translations),
+        "rotation": builder.array("VEC4", track.quaternions[:, [1, 2, 3, 0]], target=None),
+        "translation": builder.array("VEC3", track.translations, target=None),
     }
     return {
         "name": "track",
@@ -233,11 +235,6 @@ def _animation(builder: Builder, track: Track, fps: float) -> dict[str, Any]:
 
 def _image(builder: Builder, name: str, data: bytes) -> dict[str, Any]:
     return {"name": name, "mimeType": "image/png", "bufferView": builder.view(data)}
-
-
-def _chosen(videos: Sequence[Video]) -> Video:
-    """One is enough: what plays anywhere if it is there."""
-    return next((video for video in videos if video.codec == PLAYS_ANYWHERE), videos[0])
 
 
 def _stored(level: AssetLevel, entry: StoredFile) -> bytes:

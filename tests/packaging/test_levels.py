@@ -9,8 +9,7 @@ import pytest
 
 from facefolds_core.asset import read_asset
 from facefolds_core.asset.validation import validate_asset
-from facefolds_core.packaging.levels import Resampled
-from facefolds_core.packaging.rungs import is_streamed, stream_unit
+from facefolds_core.packaging.levels import Resampled, is_streamed, stream_unit
 from facefolds_core.params import LevelParams, StreamParams
 from tests.asset.filmed import filmed, packaged
 from tests.viewer.fixtures import random_reflection
