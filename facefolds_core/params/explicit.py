@@ -16,10 +16,9 @@ from facefolds_core.params.surfaces import GeometryParams, StartParams
 class GridTextureParams(Section):
     """The texel grids: how fine, and how they are trained. Rates are Adam's."""
 
-    pixels_per_texel: Annotated[float, Field(ge=0.1, le=1000)] = 1.2
-    """Of the finest textures, seen head on from the median camera. Of textures that are trained with a reflection 1.2
-    measured 0.1 to 0.3 dB better than 1.5 on cameras left out, one pixel a texel 0 to 0.2 dB worse: some thirty cameras
-    do not determine so many texels of twelve layers."""
+    pixels_per_texel: Annotated[float, Field(ge=0.1, le=1000)] = 1.0
+    """Of the finest textures, seen head on from the median camera. Finer ones than a pixel cost more bytes and time, and
+    lose over other backgrounds what they gain inside."""
 
     rays_per_texel: Factor = 2.5
     """Of one frame, in one step: each texel is met, few rays twice."""
