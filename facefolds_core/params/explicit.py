@@ -17,8 +17,8 @@ class GridTextureParams(Section):
     """The texel grids: how fine, and how they are trained. Rates are Adam's."""
 
     pixels_per_texel: Annotated[float, Field(ge=0.1, le=1000)] = 1.0
-    """Of the finest textures, seen head on from the median camera. Finer ones than a pixel cost more bytes and time, and
-    lose over other backgrounds what they gain inside."""
+    """Of the finest textures, seen head on from the median camera. Finer ones than a pixel cost more bytes and time,
+    and lose over other backgrounds what they gain inside."""
 
     rays_per_texel: Factor = 2.5
     """Of one frame, in one step: each texel is met, few rays twice."""

@@ -98,9 +98,11 @@ def belief(splats: Splats, scene: Scene, body: Bool) -> Array:
 
     A body that leaves its ball all around goes on as a wall, of which the ball has cut out a disc. Then only what is
     more than half as far from all that goes on, along the body's own surface, as its farthest part is surely the
-    subject's; pictures are asked about the rest.
+    subject's; pictures are asked about the rest. A ball that the user gives holds the subject, whatever goes on from it.
     """
-    reach, sure = scene.radius or REACH, body.astype(np.float32)
+    reach, sure = REACH, body.astype(np.float32)
+    if scene.radius is not None:
+        return sure
     away = np.linalg.norm(splats.means, axis=1)
     solid = (splats.opacities > SOLID) & (body | ((away < AROUND * reach) & _seen(splats, scene)))
     if not (body & solid).any():

@@ -236,6 +236,8 @@ def test_a_wall_that_the_ball_cuts_off_all_around_is_doubtful_and_a_neck_is_not(
     sure = belief(both, scene, subject_of(both, scene))
     assert set(sure[: len(wall)][(far > 0.15) & (far < 0.4)]) == {np.float32(DOUBT)}
     assert set(sure[-40:]) == {1} and not sure[: len(wall)][far > 0.5].any()
+    given = replace(scene, radius=0.45)
+    assert set(belief(both, given, subject_of(both, given))) == {0, 1}
     chest = small(np.concatenate([ring @ [towards, across] + x * aside for x in np.arange(-0.7, 0.2, 0.02)]))
     sure = belief(chest, scene, subject_of(chest, scene))
     assert set(sure) == {0, 1} and set(sure[-200:]) == {1}
