@@ -98,7 +98,7 @@ def belief(splats: Splats, scene: Scene, body: Bool) -> Array:
 
     A body that leaves its ball all around goes on as a wall, of which the ball has cut out a disc. Then only what is
     more than half as far from all that goes on, along the body's own surface, as its farthest part is surely the
-    subject's; pictures are asked about the rest. A ball that the user gives holds the subject, whatever goes on from it.
+    subject's; pictures are asked about the rest. A ball that the user gives holds the subject, whatever goes on there.
     """
     reach, sure = REACH, body.astype(np.float32)
     if scene.radius is not None:
