@@ -209,13 +209,13 @@ def cameras_with_pictures(
     calibrations: Sequence[Calibration],
     photos: Mapping[str, Mapping[str, Any]],
     root: Path,
-    kinds: tuple[str, str] = ("no_images", "uncalibrated"),
+    krt: bool = False,
 ) -> tuple[list[Calibration], list[Fact]]:
     """Cameras with both calibration and pictures, and facts on those without pictures, and without a calibration.
 
     Args:
         photos: camera -> frame -> picture.
-        kinds: of these facts.
+        krt: whether the calibrations are those of a KRT, which the facts then name.
     """
     known = {one.name for one in calibrations}
     used = [one for one in calibrations if photos.get(one.name)]
@@ -227,8 +227,16 @@ def cameras_with_pictures(
             found=shorten(list(photos), 5) or "none",
             remedy="copy calibration and pictures of the same subject",
         )
-    bare = [fact(kinds[0], camera=one.name) for one in calibrations if not photos.get(one.name)]
-    strange = [fact(kinds[1], camera=name) for name in photos if name not in known and photos[name]]
+    bare = [
+        fact("camera_without_images" if krt else "no_images", camera=one.name)
+        for one in calibrations
+        if not photos.get(one.name)
+    ]
+    strange = [
+        fact("camera_without_calibration" if krt else "uncalibrated", camera=name)
+        for name in photos
+        if name not in known and photos[name]
+    ]
     return used, bare + strange
 
 

@@ -55,7 +55,8 @@ def _held_out_psnr(scene: Scene, folder: Path) -> float:
 def trained(tmp_path_factory: pytest.TempPathFactory) -> tuple[Scene, Path]:
     folder = tmp_path_factory.mktemp("explicit")
     scene = make_scene(folder / "scene", size=64, surface_radius=OPAQUE[0].radius, mattes=True)
-    fit_explicit(scene, _params(iterations=330, geometry={}), folder / "log").save(folder / "model")
+    params = _params(iterations=330, geometry={}, textures={"pixels_per_texel": 1.2})
+    fit_explicit(scene, params, folder / "log").save(folder / "model")
     return scene, folder / "model"
 
 

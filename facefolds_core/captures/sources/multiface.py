@@ -67,9 +67,7 @@ def read_multiface(root: Path, subject: Subject, fps: float = FPS) -> Capture:
     calibration = read_krt(root / "KRT")
     segment = _segment(root, subject.segment)
     photos, masks, mattes = (_pictures(root / kind / segment) for kind in ("images", "masks", "mattes"))
-    used, left_out = cameras_with_pictures(
-        calibration, photos, root, ("camera_without_images", "camera_without_calibration")
-    )
+    used, left_out = cameras_with_pictures(calibration, photos, root, krt=True)
     names = sorted({frame for camera in used for frame in photos[camera.name]})
     listed = _listed(root / "frame_list.txt", segment)
     left_out += [fact("frame_without_images", frame=name) for name in listed if name not in names]
