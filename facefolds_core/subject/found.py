@@ -36,7 +36,7 @@ NEAR = 0.1
 """Standard deviation of the neighbourhood of the origin in which the body is the heaviest, units."""
 VIEWS = 3
 """Training cameras that must have a Gaussian in their pictures, at least; all, where there are fewer."""
-AROUND_IT = 0.5
+SURROUNDING = 0.5
 """Length of the mean direction in which a body leaves the ball, below which it leaves it all around: a wall that
 surrounds the subject has 0, a neck and chest 0.8."""
 DIRECTIONS = 3
@@ -99,6 +99,9 @@ def belief(splats: Splats, scene: Scene, body: Bool) -> Array:
     A body that leaves its ball all around goes on as a wall, of which the ball has cut out a disc. Then only what is
     more than half as far from all that goes on, along the body's own surface, as its farthest part is surely the
     subject's; pictures are asked about the rest. A ball that the user gives holds the subject, whatever goes on there.
+
+    Args:
+        body: (N,) of `subject_of`.
     """
     reach, sure = REACH, body.astype(np.float32)
     if scene.radius is not None:
@@ -111,7 +114,7 @@ def belief(splats: Splats, scene: Scene, body: Bool) -> Array:
     steps = _steps(splats.means[solid], longest_axes(splats.values[solid]), ~body[solid] & (away[solid] > reach), voxel)
     own, near = body[solid] & np.isfinite(steps), body[solid] & (steps <= 2)
     ways = np.unique(np.rint(DIRECTIONS * splats.means[solid][near] / away[solid][near][:, None]), axis=0)
-    if not len(ways) or np.linalg.norm((ways / np.linalg.norm(ways, axis=1)[:, None]).mean(0)) > AROUND_IT:
+    if not len(ways) or np.linalg.norm((ways / np.linalg.norm(ways, axis=1)[:, None]).mean(0)) > SURROUNDING:
         return sure
     doubtful = np.flatnonzero(solid)[own & (steps <= 0.5 * steps[own].max())]
     sure[doubtful] = DOUBT
@@ -131,14 +134,14 @@ def _steps(means: Array, ends: Array, first: Bool, voxel: float) -> Array:
         first: (N,) where the way begins.
         voxel: side of a cell.
     """
+    if not first.any():
+        return np.full(len(means), np.inf)
     places = np.floor(np.concatenate([means, means - ends, means + ends]) / voxel).astype(np.int64)
     cells, cell = np.unique(places, axis=0, return_inverse=True)
     cell = cell.reshape(3, -1)
     touching = KDTree(cells).query_pairs(1.8, output_type="ndarray")  # sides, edges and corners: root of 3 at most
     pairs = np.concatenate([touching, cell[[0, 1]].T, cell[[0, 2]].T])
     graph = coo_array((np.ones(len(pairs), np.int8), pairs.T), (len(cells), len(cells)))
-    if not first.any():
-        return np.full(len(means), np.inf)
     far = dijkstra(graph, False, np.unique(cell[0][first]), unweighted=True, min_only=True)
     return np.asarray(far[cell[0]])
 

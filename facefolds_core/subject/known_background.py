@@ -127,7 +127,7 @@ def _widely(values: Array, width: float) -> Array:
 
 
 def _likeliest(
-    image: Array, plate: Array, mean: Array, covariance: Array, beside: Array, noise: Array, params: PlateParams
+    image: Array, plate: Array, mean: Array, covariance: Array, beside: Array, variance: Array, params: PlateParams
 ) -> tuple[Array, Array]:
     """Expected opacity (P,), and the subject's colour (P, 3) with it.
 
@@ -135,20 +135,20 @@ def _likeliest(
         image, plate, mean: (P, 3).
         covariance: (P, 3, 3).
         beside: (P,) mean opacity of what is known around.
-        noise: (P, 1) variance of both.
+        variance: (P, 1) of image and plate.
     """
     steps = np.linspace(0, 1, params.steps, dtype=np.float32)
     variances, axes = np.linalg.eigh(covariance)
     variances = np.maximum(variances, TINY)
     across = np.einsum("pij,pi->pj", axes, mean - plate)
     off = np.einsum("pij,pi->pj", axes, image - plate)
-    spread = steps[:, None, None] ** 2 * variances + noise
+    spread = steps[:, None, None] ** 2 * variances + variance
     error = off - steps[:, None, None] * across
     chance = -0.5 * (error**2 / spread + np.log(spread)).sum(-1)
     chance -= params.alike * np.abs(steps[:, None] - beside)
     chance[-1] += params.solid
     chance = np.exp(chance - chance.max(0))
     opacity = (chance * steps[:, None]).sum(0) / chance.sum(0)
-    gain = opacity[:, None] * variances / (opacity[:, None] ** 2 * variances + noise)
+    gain = opacity[:, None] * variances / (opacity[:, None] ** 2 * variances + variance)
     colour = mean + np.einsum("pij,pj->pi", axes, gain * (off - opacity[:, None] * across))
     return opacity.astype(np.float32), np.clip(colour, 0, 1).astype(np.float32)
