@@ -26,7 +26,6 @@ FIRST = {
     "subject": ("iterations",),
     "train": (
         "preset",
-        "device",
         "seed",
         "layers",
         "iterations",

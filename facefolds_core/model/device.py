@@ -7,6 +7,8 @@ import torch
 from facefolds_core.errors import UserError
 from facefolds_core.params import ExplicitParams, MlpParams
 
+CPU = torch.device("cpu")
+
 
 def pick_device(name: str) -> torch.device:
     """ "auto", "cpu" or "cuda" -> device.
@@ -28,9 +30,9 @@ def pick_device(name: str) -> torch.device:
 
 
 def device_of(train: ExplicitParams | MlpParams) -> torch.device:
-    """That a model is trained and looked at on. "auto" of `fast` is the CPU, for which its kernels are compiled.
+    """That a model is trained and looked at on: of `fast` the CPU, for which its kernels are compiled.
 
     Raises:
         UserError: as `pick_device`.
     """
-    return pick_device("cpu" if train.model == "explicit" and train.device == "auto" else train.device)
+    return CPU if train.model == "explicit" else pick_device(train.device)

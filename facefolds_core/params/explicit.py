@@ -81,9 +81,6 @@ class ExplicitParams(Section):
     model: Literal["explicit"] = "explicit"
     """Follows from the preset."""
 
-    device: Literal["auto", "cpu", "cuda"] = "auto"
-    """ "cuda" runs the texture steps in torch, and needs its CUDA build; "auto" is "cpu": no GPU has been measured."""
-
     seed: Seed = 0
     """Seed of the draws of rays and frames."""
 

@@ -39,7 +39,7 @@ SCRIPTS = {
         from tests.scenes import OPAQUE, make_scene
 
         scene = make_scene(folder / "scene", size=32, surface_radius=OPAQUE[0].radius, mattes=True)
-        params = ExplicitParams.model_validate({"device": "cpu", "layers": 4, "iterations": 183})
+        params = ExplicitParams.model_validate({"layers": 4, "iterations": 183})
         fit_explicit(scene, params, folder / "log").save(folder / "model")
         show(np.frombuffer((folder / "model" / "model.safetensors").read_bytes(), np.uint8))
     """,

@@ -31,7 +31,7 @@ GEOMETRY = ExplicitParams().geometry
 def _params(**values: object) -> ExplicitParams:
     few = {"iterations": 10, "geometry": {"nodes": 48, "round_iterations": 15}}
     small = {"layers": 6, "reflection": {"texels": 6, "environment_texels": 4}, **few}
-    params = train_params({"preset": "fast", "device": "cpu", **small, **values})
+    params = train_params({"preset": "fast", **small, **values})
     assert isinstance(params, ExplicitParams)
     return params
 

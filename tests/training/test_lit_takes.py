@@ -10,7 +10,6 @@ from unittest.mock import patch
 
 import numpy as np
 import pytest
-import torch
 
 from facefolds_core.captures.scene import Scene
 from facefolds_core.geometry.track import Track
@@ -48,19 +47,19 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Scene, Path, Base]:
 def test_frames_of_a_still_head_are_lit_as_the_base_is(made: tuple[Scene, Path, Base]) -> None:
     scene, _, base = made
     views = trace_views(scene, base.manifolds, 1)
-    fitter = FrameFitter(scene, base, lit(), torch.device("cpu"), views)
+    fitter = FrameFitter(scene, base, lit(), views)
     assert base.textures.reflection is not None
     expected = Maps.of(base.textures.reflection).on_rays(views)
     assert np.abs(expected).max() > 0
     np.testing.assert_array_equal(fitter.state.shine, expected)
-    assert len(FrameFitter(scene, base, lit("end"), torch.device("cpu"), views).state.shine) == 0
+    assert len(FrameFitter(scene, base, lit("end"), views).state.shine) == 0
 
 
 def test_frames_of_a_turning_head_are_lit_as_it_stands(made: tuple[Scene, Path, Base]) -> None:
     scene, _, base = made
     turns = Track.of([about((0, 0, 1), 8.0 * k) for k in range(FRAMES)], np.zeros((FRAMES, 3)))
     turning = replace(scene, poses=turns)
-    fitter, turned = FrameFitter(turning, base, lit(), torch.device("cpu")), list[object]()
+    fitter, turned = FrameFitter(turning, base, lit()), list[object]()
     original = Maps.on_rays
 
     def on_rays(self: Maps, views: Views, turn: np.ndarray | None = None) -> np.ndarray:

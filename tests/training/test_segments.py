@@ -35,7 +35,6 @@ FRAMES = 5
 def params(**segments: object) -> ExplicitParams:
     given = {
         "preset": "fast",
-        "device": "cpu",
         "layers": 3,
         "iterations": 30,
         "geometry": {"rounds": [1.0], "round_iterations": 10},

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facefolds_core.captures.scene import Scene, Split
-from facefolds_core.model.device import device_of
+from facefolds_core.model.device import CPU
 from facefolds_core.params import ExplicitParams, SubjectParams
 from facefolds_core.progress import progress
 from facefolds_core.subject.find import found_in, subject_in
@@ -68,7 +68,6 @@ def fit_with_surroundings(scene: Scene, params: ExplicitParams, log: Path) -> tu
 
 def _fit(scene: Scene, params: ExplicitParams, log: Path) -> tuple[Trained, Surroundings]:
     """The same of a scene whose subject was found."""
-    device = device_of(params)
     began = time.perf_counter()
     with open_log(log) as live:
         bar = progress(total=params.iterations, desc="train", unit="it")
@@ -82,7 +81,7 @@ def _fit(scene: Scene, params: ExplicitParams, log: Path) -> tuple[Trained, Surr
         warnings = warnings_of(scene, fit)
         for note in (*fit.notes, *warnings):
             bar.write(f"train: {note}")
-        trainer = Trainer(cameras, params, fit, device, pictures, teacher)
+        trainer = Trainer(cameras, params, fit, pictures, teacher)
         trainer.events = [*trainer.events, *warnings]
         pixels = len(cameras.scene.indices("train")) * scene.width * scene.height
         levels = plan(fit, params, scene.num_frames, pixels)
@@ -95,8 +94,8 @@ def _fit(scene: Scene, params: ExplicitParams, log: Path) -> tuple[Trained, Surr
     report = make_report(
         time.perf_counter() - began,
         trainer.iteration,
-        device_name(device),
-        peak_memory(device),
+        device_name(CPU),
+        peak_memory(CPU),
         params.preset,
         trainer.rays,
         trainer.psnr,

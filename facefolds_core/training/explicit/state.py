@@ -1,11 +1,9 @@
-"""Texture grids while they are trained: values and Adam's moments. Steps are compiled for CPUs; `state_torch.py` runs
-them elsewhere."""
+"""Texture grids while they are trained: values and Adam's moments."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
-from functools import partial
 
 import numpy as np
 import torch
@@ -105,9 +103,6 @@ class TextureState:
         """Keep the layers' opacity near this, (M, N), where pictures say little."""
         self.believed = _logits(opacity)
 
-    def _go_back(self, believed: Tensor, share: float) -> None:
-        self.layers[0, ..., 3].lerp_(believed, share)
-
     def _start(self) -> Tensor:
         """[M, 4]: `start` at the texels."""
         image = self.start.permute(2, 0, 1)[None]
@@ -153,7 +148,7 @@ class TextureState:
         correct = self._count_step(frame)
         squares = self._step(views, rays, pictures, frame, min_alpha, rates, correct)
         if self.believed is not None:
-            self._go_back(self.believed, BELIEF * self.pace)
+            self.layers[0, ..., 3].lerp_(self.believed, BELIEF * self.pace)
         return squares / (3 * len(rays))
 
     def _count_step(self, frame: int) -> NDArray[np.float32]:
@@ -245,15 +240,6 @@ class TextureState:
         """Give their memory back, two thirds of the grids'; no `step` can follow."""
         self.colour, self.layers = self.colour[:1].clone(), self.layers[:1].clone()
         self.frame_colour, self.frame_alpha = self.frame_colour[:1].clone(), self.frame_alpha[:1].clone()
-
-
-def state_on(device: torch.device) -> Callable[..., TextureState]:
-    """What makes a state whose steps run there; its arguments are those of `TextureState`."""
-    if device.type == "cpu":
-        return TextureState
-    from facefolds_core.training.explicit.state_torch import TorchTextureState
-
-    return partial(TorchTextureState, device)
 
 
 def _logits(opacity: NDArray[np.float32]) -> Tensor:

@@ -28,7 +28,7 @@ from facefolds_core.training.explicit.gloss import GlossFit
 from facefolds_core.training.explicit.plan import Level, epochs
 from facefolds_core.training.explicit.rates import falling, rates_of
 from facefolds_core.training.explicit.second_surface import LAYERS, second_layers, shells_of_both
-from facefolds_core.training.explicit.state import MIN_ALPHA, TextureState, on_one_thread, state_on
+from facefolds_core.training.explicit.state import MIN_ALPHA, TextureState, on_one_thread
 from facefolds_core.training.explicit.targets import CutOuts
 from facefolds_core.training.explicit.teacher import Teacher
 from facefolds_core.training.explicit.views import Rays, rays_of
@@ -55,11 +55,10 @@ class Trainer:
         cameras: CameraChoice,
         params: ExplicitParams,
         fit: Fit,
-        device: torch.device,
         pictures: CutOuts,
         teacher: Teacher,
     ) -> None:
-        self.cameras, self.params, self.fit, self.device = cameras, params, fit, device
+        self.cameras, self.params, self.fit = cameras, params, fit
         self.scene = cameras.scene
         self.pictures, self.teacher = pictures, teacher
         self.random = np.random.default_rng(params.seed)
@@ -133,7 +132,7 @@ class Trainer:
     def _new_state(self, texels: tuple[int, int]) -> TextureState:
         start = torch.from_numpy(np.concatenate([self.fit.rgb, self.fit.opacity[..., None]], -1)).float()
         shape = (self.layers, self.scene.num_frames)
-        return state_on(self.device)(texels, *shape, start, self.params)
+        return TextureState(texels, *shape, start, self.params)
 
     def _begin_with_subject(self, fill: bool, colours: bool) -> None:
         """Let the layers believe in the opacity of the subject's Gaussians, and begin with it, each frame with its own;

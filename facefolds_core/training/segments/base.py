@@ -73,7 +73,7 @@ class Base:
 def digest_of_training(params: ExplicitParams) -> bytes:
     """Of the parameters, and of the code of trainings and models: results of other code are not taken up."""
     digest = hashlib.sha256()
-    left_out = {"device", "preset", "segments"}
+    left_out = {"preset", "segments"}
     values = params.model_dump(mode="json", exclude=left_out)
     digest.update(json.dumps(values, sort_keys=True).encode())
     digest.update(digest_of_packages("training", "subject", "model", "geometry", "params", "spacing").encode())

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facefolds_core.captures.scene import Scene
-from facefolds_core.model.device import device_of
 from facefolds_core.params import ExplicitParams
 from facefolds_core.training.explicit.views import Views
 from facefolds_core.training.segments.base import read_base, with_its_cameras
@@ -39,8 +38,8 @@ class Fitting:
 
     def fitter(self, views: Views | None = None, shine: NDArray[np.float32] | None = None) -> FrameFitter:
         """Args: of a still head, if they are known, `views`: crossings of its rays, `shine`: see `FrameFitter`."""
-        base, device = read_base(self.base, self.fingerprint), device_of(self.params)
-        return FrameFitter(with_its_cameras(self.scene, base), base, self.params, device, views, shine)
+        base = read_base(self.base, self.fingerprint)
+        return FrameFitter(with_its_cameras(self.scene, base), base, self.params, views, shine)
 
     def cache(self) -> SegmentCache:
         return SegmentCache(self.folder)

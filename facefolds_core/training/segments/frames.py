@@ -19,7 +19,7 @@ from facefolds_core.errors import UserError
 from facefolds_core.params import ExplicitParams
 from facefolds_core.training.explicit.follow import follow_frame, follow_rates, lagging, mean_errors
 from facefolds_core.training.explicit.rates import falling, rates_of
-from facefolds_core.training.explicit.state import MIN_ALPHA, TextureState, state_on
+from facefolds_core.training.explicit.state import MIN_ALPHA, TextureState
 from facefolds_core.training.explicit.targets import CutOuts
 from facefolds_core.training.explicit.views import MovingRays, Rays, StillRays, Views, trace_views
 from facefolds_core.training.segments.base import Base
@@ -46,7 +46,6 @@ class FrameFitter:
         scene: with the cameras that the base was made with.
         base: see there.
         params: of the training.
-        device: of the textures.
         views: crossings of the rays of a still head, if they are known,
         shine: and what the reflection adds to each (`shine_of`).
     """
@@ -56,7 +55,6 @@ class FrameFitter:
         scene: Scene,
         base: Base,
         params: ExplicitParams,
-        device: torch.device,
         views: Views | None = None,
         shine: NDArray[np.float32] | None = None,
     ) -> None:
@@ -64,7 +62,7 @@ class FrameFitter:
         self.pictures = CutOuts(scene, base.surroundings.gains, kept_bytes=0)
         h, w = base.spec.texels
         shape = (base.spec.num_layers, 1)
-        self.state = state_on(device)((h, w), *shape, torch.zeros(2, 2, 4), self.params)
+        self.state = TextureState((h, w), *shape, torch.zeros(2, 2, 4), self.params)
         with torch.no_grad():
             self.state.colour[0].copy_(base.textures.colour.view(h * w, 3))
             self.state.layers[0].copy_(base.textures.layers.view(h * w, -1, 4))

@@ -18,7 +18,7 @@ from tqdm import tqdm
 from facefolds_core.captures.scene import Scene
 from facefolds_core.facts import fact
 from facefolds_core.files.writing import read_json
-from facefolds_core.model.device import device_of
+from facefolds_core.model.device import CPU
 from facefolds_core.model.radiance import RadianceManifolds
 from facefolds_core.model.segmented import SegmentedTextures
 from facefolds_core.model.storage import ExplicitSpec
@@ -75,7 +75,6 @@ class _Take:
     def __init__(self, scene: Scene, params: ExplicitParams, folder: Path, log: Path, told: Forecast) -> None:
         check_images(scene)
         self.scene, self.params, self.folder, self.log = scene, params, folder, log
-        self.device = device_of(params)
         self.began = time.perf_counter()
         self.plan = plan_take(scene, params, told.key_frames or 1)
         self.used = Used()
@@ -113,7 +112,7 @@ class _Take:
                 cache.read(cache.path(segment.names))
                 bar.set_postfix(segments=f"{log.there()} of {total}", refresh=False)
 
-            if processes > 1 and self.device.type == "cpu":
+            if processes > 1:
                 threads = max(1, numba.get_num_threads() // processes)
                 memory = processes * process_bytes(self.scene, self.params, h * w) / 1e9
                 tqdm.write(
@@ -149,8 +148,8 @@ class _Take:
             time.perf_counter() - self.began,
             int(read_json(base.folder / "training.json", _REMEDY)["iterations"])
             + self.params.segments.steps * self.scene.num_frames,
-            device_name(self.device),
-            peak_memory(self.device) + sum(self.used.memory.values()),
+            device_name(CPU),
+            peak_memory(CPU) + sum(self.used.memory.values()),
             self.params.preset,
             self.used.rays,
             psnr,
