@@ -38,6 +38,10 @@ ERROR_RATIO, SMOOTHING = 9.0, 0.1
 """Training diverges where the running mean of the squared error is so many times the best of its level; share of the
 newest step in that mean."""
 
+GRAZING = 2.0
+"""Layers begin as opaque as so many of what the Gaussians put there. Rays along an outline meet a sheet once, where
+they go far through what the sheet stands for: with 1 outlines are too transparent, with 4 loose hair is lost."""
+
 LAYER_ALPHA = 1 / 255
 """Outer or inner layers whose alpha is nowhere larger are dropped: no pixel changes by more."""
 
@@ -147,7 +151,7 @@ class Trainer:
 
         def held(volume: Volume) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
             opacity, rgb = shells_of_both(volume, self.fit.chart, uv, places, self.params.layers)
-            return opacity.reshape(flat), rgb.reshape(*flat, 3)
+            return 1 - (1 - opacity.reshape(flat)) ** np.float32(GRAZING), rgb.reshape(*flat, 3)
 
         opacity, rgb = held(self.fit.volume)
         self.state.believe(opacity)
