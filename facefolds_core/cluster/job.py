@@ -31,9 +31,10 @@ from facefolds_core.errors import UserError
 from facefolds_core.system.processes import with_threads
 
 RUNNING = re.compile(r"Running stage '([^']+)'")
-LOST_RECORD = re.compile(r"^ERROR: .*\bruns\b.*\.tmp'", re.MULTILINE)
-"""What DVC ends with where another one took its half-written record of a run for a damaged one, and removed it: two
-jobs with a stage in common that run it at once (dvc/stage/cache.py, 3.x: `_load` takes the newest file of a folder)."""
+LOST_RECORD = re.compile(r"^ERROR: .*(\bruns\b.*\.tmp'|join\(\) argument must be .* not 'NoneType')", re.MULTILINE)
+"""What DVC ends with where two jobs with a stage in common run it at once: one took the other's half-written record of
+a run for a damaged one, and removed it, or found the record's folder before there was anything in it
+(dvc/stage/cache.py, 3.x: `_load` takes the newest file of a folder)."""
 ATTEMPTS = 5
 
 

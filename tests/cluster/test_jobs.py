@@ -29,6 +29,10 @@ def test_captures_and_named_mattes_are_linked(tmp_path: Path, keys: str, linked:
 
 
 LOST = "ERROR: failed to reproduce 'configure': [Errno 2] No such file: '/p/.dvc/cache/runs/47/475c/.4sh.tmp'\n"
+EMPTY = (
+    "ERROR: failed to reproduce 'configure': join() argument must be str, bytes, or os.PathLike object,"
+    " not 'NoneType'\n"
+)
 DAMAGED = "WARNING: corrupted cache file '../cache/runs/47/475c/.4sh.tmp'.\nERROR: failed: 'evaluate@bad'\n"
 
 
@@ -36,6 +40,7 @@ DAMAGED = "WARNING: corrupted cache file '../cache/runs/47/475c/.4sh.tmp'.\nERRO
     ("answers", "expected"),
     [
         ([(1, LOST), (0, "done\n")], (0, LOST + "done\n", 2)),
+        ([(1, EMPTY), (0, "done\n")], (0, EMPTY + "done\n", 2)),
         ([(1, DAMAGED), (0, "")], (1, DAMAGED, 1)),  # other failures are not repeated
         ([(0, LOST), (1, "")], (0, LOST, 1)),
         ([(1, LOST)] * (ATTEMPTS + 1), (1, LOST * ATTEMPTS, ATTEMPTS)),  # it ends

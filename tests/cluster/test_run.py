@@ -79,7 +79,7 @@ def test_results_are_as_of_dvc_repro_and_a_failing_job_fails_alone(tmp_path: Pat
     assert "evaluate: error: this one is bad" in output
     assert "not found in the cache" not in output
     lines = {line.split()[0]: line.split()[1] for line in output.splitlines() if line[:2] in ("a ", "bb", "ba")}
-    assert lines == {"a": "done", "bb": "done", "bad": "failed"}
+    assert lines == {"a": "done", "bb": "done", "bad": "failed"}, output
     for name in ("a", "bb", ".config"):
         assert files_of(parallel / "data" / name) == files_of(serial / "data" / name)
     changed = (parallel / "dvc.lock").read_text().replace("parallel-captures", "serial-captures")
