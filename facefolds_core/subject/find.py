@@ -24,7 +24,7 @@ from facefolds_core.subject.cameras import CameraFit
 from facefolds_core.subject.drawing import draw, view_of
 from facefolds_core.subject.fit import fit_pictures
 from facefolds_core.subject.foreign import read_start
-from facefolds_core.subject.found import joined
+from facefolds_core.subject.found import joined, reference_frame
 from facefolds_core.subject.gaussians import GaussianParams
 from facefolds_core.subject.mattes import Image, Key, Mattes, body_among
 from facefolds_core.subject.splats import Splats
@@ -53,11 +53,6 @@ class View:
     key: Key
     colours: Array
     opacity: Array
-
-
-def reference_frame(scene: Scene) -> int:
-    """The frame in which the subject is found: the middle one; of a head that turns the one nearest its mean pose."""
-    return scene.num_frames // 2 if scene.poses is None else scene.poses.nearest()
 
 
 def frames_looked_at(scene: Scene) -> list[int]:

@@ -45,6 +45,11 @@ DOUBT = 0.7
 """Opacity as which a Gaussian counts that may be of the room: too little to be surely the subject's."""
 
 
+def reference_frame(scene: Scene) -> int:
+    """The frame in which the subject is found: the middle one; of a head that turns the one nearest its mean pose."""
+    return scene.num_frames // 2 if scene.poses is None else scene.poses.nearest()
+
+
 def subject_of(splats: Splats, scene: Scene) -> Bool:
     """(N,) whether a Gaussian is the subject's, of those of a whole scene."""
     return _body(splats, near_enough(splats, scene), scene.radius or REACH)

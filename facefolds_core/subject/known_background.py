@@ -38,6 +38,7 @@ class PlateParams:
         alike: price, as a logarithm of likelihood, of an opacity that differs by 1 from those around it.
         beside: surroundings of a pixel that `alike` compares, standard deviation, pixels.
         solid: bonus, as a logarithm of likelihood, of an opacity of 1.
+        believed: standard deviation of an opacity from what the subject's Gaussians say.
         steps: opacities from 0 to 1 that are compared.
     """
 
@@ -55,6 +56,7 @@ class PlateParams:
     alike: float = 3.0
     beside: float = 1.5
     solid: float = 2.0
+    believed: float = 0.2
     steps: int = 21
 
 
@@ -63,7 +65,13 @@ TINY = float(np.finfo(np.float32).eps)
 
 
 def opacity_before(
-    image: Array, plate: Array, inside: Mask, unknown: Mask, noise: float | Array, params: PlateParams
+    image: Array,
+    plate: Array,
+    inside: Mask,
+    unknown: Mask,
+    noise: float | Array,
+    params: PlateParams,
+    start: tuple[Array, Array] | None = None,
 ) -> Array:
     """(H, W) in [0, 1]: 1 on `inside`, 0 beyond it and `unknown`.
 
@@ -72,6 +80,8 @@ def opacity_before(
         inside: (H, W) surely the subject's, somewhere.
         unknown: (H, W) where opacity is asked for.
         noise: standard deviation of both, of values in [0, 1]; or (H, W), each pixel's.
+        start: (H, W) opacity of the subject's Gaussians, and how far it is believed, from 0 to 1: it decides where
+            subject and plate have one colour.
     """
     variance = np.broadcast_to(np.square(np.float32(noise)) + np.float32(TINY), inside.shape)
     opacity, unknown = inside.astype(np.float32), unknown & ~inside
@@ -83,8 +93,9 @@ def opacity_before(
         sure = known.astype(np.float32)
         beside = _blurred(opacity * sure, params.beside)[ring]
         beside /= np.maximum(_blurred(sure, params.beside)[ring], TINY)
+        believed = None if start is None else (start[0][ring], start[1][ring])
         opacity[ring], colours[ring] = _likeliest(
-            image[ring], plate[ring], mean, covariance, beside, variance[ring][:, None], params
+            image[ring], plate[ring], mean, covariance, beside, variance[ring][:, None], params, believed
         )
         known[ring] = True
     return opacity
@@ -127,7 +138,14 @@ def _widely(values: Array, width: float) -> Array:
 
 
 def _likeliest(
-    image: Array, plate: Array, mean: Array, covariance: Array, beside: Array, variance: Array, params: PlateParams
+    image: Array,
+    plate: Array,
+    mean: Array,
+    covariance: Array,
+    beside: Array,
+    variance: Array,
+    params: PlateParams,
+    start: tuple[Array, Array] | None,
 ) -> tuple[Array, Array]:
     """Expected opacity (P,), and the subject's colour (P, 3) with it.
 
@@ -136,6 +154,7 @@ def _likeliest(
         covariance: (P, 3, 3).
         beside: (P,) mean opacity of what is known around.
         variance: (P, 1) of image and plate.
+        start: (P,) opacity of the Gaussians, and how far it is believed.
     """
     steps = np.linspace(0, 1, params.steps, dtype=np.float32)
     variances, axes = np.linalg.eigh(covariance)
@@ -147,6 +166,8 @@ def _likeliest(
     chance = -0.5 * (error**2 / spread + np.log(spread)).sum(-1)
     chance -= params.alike * np.abs(steps[:, None] - beside)
     chance[-1] += params.solid
+    if start is not None:
+        chance -= 0.5 * start[1] * np.square((steps[:, None] - start[0]) / params.believed)
     chance = np.exp(chance - chance.max(0))
     opacity = (chance * steps[:, None]).sum(0) / chance.sum(0)
     gain = opacity[:, None] * variances / (opacity[:, None] ** 2 * variances + variance)

@@ -26,8 +26,8 @@ from facefolds_core.subject.cut_out import (
     softened,
 )
 from facefolds_core.subject.drawing import draw, view_of
-from facefolds_core.subject.found import background, belief, near_enough, opacity_of, subject_of
-from facefolds_core.subject.plates import from_plate
+from facefolds_core.subject.found import background, belief, near_enough, opacity_of, reference_frame, subject_of
+from facefolds_core.subject.plates import Start, from_plate
 from facefolds_core.subject.splats import Splats
 from facefolds_core.subject.storage import Body
 
@@ -80,6 +80,7 @@ class Mattes:
         self.alone: Splats | None = None
         self._frames, self._plates, self._given = scene.open_frames(), scene.open_plates(), scene.open_mattes()
         self._drawn: tuple[Key, tuple[Array, Array]] | None = None
+        self._drawn_alone: tuple[Key, Array] | None = None
 
     def known(self, key: Key) -> bool:
         """Whether it needs no Gaussians."""
@@ -94,14 +95,14 @@ class Mattes:
             return Matte(self._given.image(*key)[..., 0], "capture")
         picture = self._frames.image(*key)
         if self._plates is not None and (key[0], 0) in self._plates:
-            return Matte(_bytes(from_plate(picture, self._plates.image(key[0], 0))), "plate")
+            return Matte(_bytes(from_plate(picture, self._plates.image(key[0], 0), start=self._start(key))), "plate")
         assert self.body is not None
         camera, (start, behind) = self.scene.camera_in_head(*key), self._seen(key)
         colours = self._colours
         cut = cut_out(picture, start, camera, colours, self.edge)
         share = agreement(cut, start > 0.5)
         if share < self.edge.agreeing and self.alone is not None:
-            start = np.asarray(1 - draw(self.alone.values, view_of(camera)).picture()[1])
+            start = self._alone_in(key)
             cut = cut_out(picture, start, camera, colours, self.edge)
             share = agreement(cut, start > 0.5)
         if share < self.edge.agreeing:
@@ -115,11 +116,31 @@ class Mattes:
         body = self.body
         return colours_of(_pictures(self.scene, body.splats, body.frame, body.subject), self.edge)
 
+    def _start(self, key: Key) -> Start | None:
+        """What Gaussians say beside a plate: of a head that stands still, once they are known."""
+        first = key[0], reference_frame(self.scene)
+        if self.alone is None or self.scene.poses is not None or first not in self._frames:
+            return None
+        return Start(self._frames.image(*first), self._alone_in(key))
+
+    def _alone_in(self, key: Key) -> Array:
+        """(H, W) opacity of the Gaussians that were trained with the subject cut out."""
+        assert self.alone is not None
+        same = self._view(key)
+        if self._drawn_alone is None or self._drawn_alone[0] != same:
+            seen = draw(self.alone.values, view_of(self.scene.camera_in_head(*key))).picture()
+            self._drawn_alone = same, np.asarray(1 - seen[1])
+        return self._drawn_alone[1]
+
+    def _view(self, key: Key) -> Key:
+        """Which pictures show the subject from the same place: all of a camera, but of a head that turns."""
+        return key if self.scene.poses is not None else (key[0], 0)
+
     def _seen(self, key: Key) -> tuple[Array, Array]:
         """(H, W) opacity of the subject's Gaussians, and (H, W, 3) what stands behind them: of a head that turns the
         room as it stood when they were fitted."""
         assert self.body is not None
-        same = key if self.scene.poses is not None else (key[0], 0)
+        same = self._view(key)
         if self._drawn is None or self._drawn[0] != same:
             body, room = self.body, self.scene.camera_in_head(key[0], self.body.frame)
             seen = opacity_of(body.splats, body.subject, self.scene.camera_in_head(*key))

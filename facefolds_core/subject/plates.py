@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -13,16 +15,44 @@ from facefolds_core.subject.known_background import PlateParams, opacity_before
 Array = NDArray[np.float32]
 Image = NDArray[np.uint8]
 
+FAINT = 0.05
+"""Opacity of the Gaussians from which on the subject may be there, whatever the plate says."""
+SOLID, DEEP = 0.95, 2
+"""Opacity of the Gaussians, and pixels within where they have it, from which on the subject is surely there."""
+SAME = 3.0
+"""Deviations of noise by which a picture may differ from that of the start where nothing has moved."""
 
-def from_plate(image: Image, plate: Image, params: PlateParams | None = None) -> Array:
+
+@dataclass(frozen=True)
+class Start:
+    """What the subject's Gaussians say of a camera. Hair before a shelf of its colour does not differ from the plate.
+
+    Attributes:
+        image: (H, W, 3) the camera's picture in the frame in which they were fitted.
+        opacity: (H, W) theirs.
+    """
+
+    image: Image
+    opacity: Array
+
+    def believed(self, image: Image, noise: float, params: PlateParams) -> Array:
+        """(H, W) in [0, 1] whether a picture looks as theirs does."""
+        one, two = (
+            cv2.GaussianBlur(part.astype(np.float32), (0, 0), params.beside) / 255 for part in (image, self.image)
+        )
+        return np.asarray(np.exp(-0.5 * np.square(np.abs(one - two).max(-1) / (SAME * noise))), np.float32)
+
+
+def from_plate(image: Image, plate: Image, params: PlateParams | None = None, start: Start | None = None) -> Array:
     """(H, W) opacity of the subject in [0, 1].
 
     Args:
         image, plate: (H, W, 3).
+        start: what the subject's Gaussians say, once they are known.
     """
     params = params or PlateParams()
     subject = _different(image, plate, params)
-    return _soft(image, plate, subject, params) if subject.any() else subject.astype(np.float32)
+    return _soft(image, plate, subject, params, start) if subject.any() else subject.astype(np.float32)
 
 
 def _different(image: Image, plate: Image, params: PlateParams) -> Image:
@@ -38,7 +68,7 @@ def _different(image: Image, plate: Image, params: PlateParams) -> Image:
     return np.asarray(kept[labels], np.uint8)
 
 
-def _soft(image: Image, plate: Image, subject: Image, params: PlateParams) -> Array:
+def _soft(image: Image, plate: Image, subject: Image, params: PlateParams, start: Start | None) -> Array:
     """Opacity along the outline, where the plate is what stands behind; 1 within it."""
     depth = np.asarray(ndimage.distance_transform_edt(np.pad(subject, 1, mode="edge")))[1:-1, 1:-1]
     labels, count = ndimage.label(subject)
@@ -49,5 +79,13 @@ def _soft(image: Image, plate: Image, subject: Image, params: PlateParams) -> Ar
     noise = float(np.median(quiet)) if quiet.size else 0.0
     differs = difference > max(params.faint, params.faint_noise * noise)
     unknown = (subject > 0) | (differs & (grown(subject, params.beyond) > 0))
+    noise = max(params.noise, noise)
+    believed = None
+    if start is not None:
+        believed = start.opacity, start.believed(image, noise, params)
+        same = believed[1] > 0.5
+        unknown |= (start.opacity > FAINT) & (believed[1] > FAINT)
+        inside &= ~same | (start.opacity > 0.5)
+        inside |= same & (grown((start.opacity < SOLID).astype(np.uint8), DEEP) == 0)
     colours, room = (part.astype(np.float32) / np.float32(255) for part in (image, plate))
-    return opacity_before(colours, room, inside, unknown, max(params.noise, noise), params)
+    return opacity_before(colours, room, inside, unknown, noise, params, believed)

@@ -29,8 +29,9 @@ from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.geometry.track import Track, own_track
 from facefolds_core.params import NormalizeParams, SubjectParams
 from facefolds_core.progress import progress
-from facefolds_core.subject.find import find_subject, reference_frame
+from facefolds_core.subject.find import find_subject
 from facefolds_core.subject.foreign import moved
+from facefolds_core.subject.found import reference_frame
 from facefolds_core.subject.storage import BODY, Body, write_body
 from facefolds_core.subject.volume import Volume, volume_of
 from facefolds_core.system.spill import by_rows

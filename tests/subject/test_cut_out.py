@@ -9,7 +9,7 @@ import pytest
 
 from facefolds_core.subject.cut_out import EdgeParams, agreement, around, colours_of, cut_out, softened
 from facefolds_core.subject.known_background import PlateParams
-from facefolds_core.subject.plates import from_plate
+from facefolds_core.subject.plates import Start, from_plate
 from tests.scenes import look_at_origin
 
 
@@ -107,6 +107,23 @@ def test_loose_hair_before_a_plate_is_strands_even_before_a_post_of_its_colour()
     image, plate, opacity = _before_a_post(np.array((60, 48, 40)))
     found, true = from_plate(image, plate, PlateParams()) > 0.5, opacity > 0.5
     assert (found & true).sum() / (found | true).sum() > 0.97
+
+
+def test_gaussians_say_where_hair_ends_before_a_shelf_of_its_colour() -> None:
+    """But in a frame in which what they show has moved away, the plate alone."""
+    rng, (y, x) = np.random.default_rng(0), np.mgrid[:96, :96]
+    hair = np.clip(30.5 - np.hypot(x - 48, y - 48), 0, 1)
+    colour = np.array((60, 48, 40)) + rng.integers(-6, 7, (96, 96, 1))
+    plate = np.where((abs(y - 40) < 14)[..., None] & (x < 60)[..., None], (58, 50, 42), (220, 210, 190))
+    image = hair[..., None] * colour + (1 - hair[..., None]) * plate
+    chin = image.copy()
+    chin[60:, 40:56] = plate[60:, 40:56]
+    plate, image, chin = (np.rint(one + rng.normal(0, 1.5, one.shape)).astype(np.uint8) for one in (plate, image, chin))
+    start = Start(image, hair.astype(np.float32))
+    alone, found = (from_plate(image, plate, start=one) for one in (None, start))
+    assert np.abs(alone - hair).mean() > 0.03  # hair that looks like the shelf is lost
+    assert np.abs(found - hair).mean() < 0.01
+    assert from_plate(chin, plate, start=start)[66:, 44:52].max() < 0.1
 
 
 def test_opacity_before_a_plate_is_on_average_right() -> None:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from facefolds_core.captures.scene import Scene
 from facefolds_core.files.frame_store import write_frames
-from facefolds_core.subject.find import reference_frame
+from facefolds_core.subject.found import reference_frame
 from facefolds_core.subject.splats import MEAN, Splats
 from facefolds_core.training.explicit.targets import CutOuts
 from facefolds_core.training.explicit.teacher import OTHERS, Teacher

@@ -17,7 +17,7 @@ from facefolds_core.geometry.chart import Chart
 from facefolds_core.geometry.sphere_uv import Window
 from facefolds_core.params import ExplicitParams, GeometryParams, StartParams
 from facefolds_core.rendering.compositing import transmittance_before
-from facefolds_core.subject.find import reference_frame
+from facefolds_core.subject.found import reference_frame
 from facefolds_core.subject.outline import (
     MIN_RADIUS,
     Profile,

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from facefolds_core.captures.scene import Scene
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.subject.drawing import draw, view_of
-from facefolds_core.subject.find import reference_frame
+from facefolds_core.subject.found import reference_frame
 from facefolds_core.subject.frames import changed_to, mean_errors, ridden, targets_of
 from facefolds_core.subject.splats import Splats
 from facefolds_core.subject.storage import FoundSubject
