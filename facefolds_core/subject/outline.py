@@ -19,7 +19,7 @@ from facefolds_core.subject.volume import Volume
 
 Array = NDArray[np.float64]
 
-MIN_RADIUS = 0.08
+MIN_RADIUS = 0.03
 """Least radius of a layer's middle, units: at c the search for crossings ends."""
 BEYOND = 3.0
 """Voxels: a surface between two voxels is blurred by so much."""

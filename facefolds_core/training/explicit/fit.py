@@ -32,7 +32,16 @@ from facefolds_core.subject.splats import Splats
 from facefolds_core.subject.storage import FoundSubject
 from facefolds_core.subject.volume import CELLS, COARSE, Volume, volume_of
 from facefolds_core.training.explicit.second_surface import LAYERS, second_surface
-from facefolds_core.training.explicit.tracked import OPACITY, REACH, TRUST, blend, mesh_radii, trusted_surface
+from facefolds_core.training.explicit.tracked import (
+    FAR,
+    OPACITY,
+    REACH,
+    TRUST,
+    WELL_SEEN,
+    blend,
+    mesh_radii,
+    trusted_surface,
+)
 
 Array = NDArray[np.float64]
 
@@ -113,10 +122,10 @@ def fit_scene(scene: Scene, subject: FoundSubject, params: ExplicitParams, other
         source = fact("middle_from_volume")
     else:
         mesh = mesh_radii(vertices, surface[1], chart, uv)
-        points = chart.points(uv, mesh).reshape(-1, 3)
-        unseen = seen_by(cameras, points).reshape(mesh.shape) < MIN_VIEW_SHARE * len(cameras)
-        seen = replace(seen, radius=np.where(unseen & np.isfinite(mesh), np.nan, seen.radius))
-        known, kept = blend(mesh, seen.radius, REACH)
+        share = seen_by(cameras, chart.points(uv, mesh).reshape(-1, 3)).reshape(mesh.shape) / len(cameras)
+        unseen = (share < MIN_VIEW_SHARE) & np.isfinite(mesh)
+        seen = replace(seen, radius=np.where(unseen, np.nan, seen.radius))
+        known, kept = blend(mesh, seen.radius, np.where(share < WELL_SEEN, FAR, REACH))
         opacity = np.where(np.isfinite(mesh) & np.isnan(seen.radius), np.maximum(opacity, OPACITY), opacity)
         source = fact("middle_from_mesh", reach=REACH)
     middle = extrapolate(known).clip(MIN_RADIUS)

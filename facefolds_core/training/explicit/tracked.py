@@ -16,8 +16,11 @@ from facefolds_core.subject.volume import Volume
 
 Array = NDArray[np.float64]
 
-REACH = 0.03
-"""Where the Gaussians lie outside a tracked mesh by more, units, they are believed: a mesh knows no hair."""
+REACH, FAR = 0.006, 0.03
+"""Where the Gaussians lie outside a tracked mesh by more, units, they are believed: a mesh knows no hair. `FAR` where
+fewer cameras look than `WELL_SEEN`: how far away things are is not known well there."""
+WELL_SEEN = 0.95
+"""Share of the training cameras."""
 MAX_DISTANCE = 0.02
 """A direction in which mesh and Gaussians lie farther apart, units, is off."""
 MAX_SHARE_OFF = 0.5
@@ -72,7 +75,7 @@ def mesh_radii(vertices: Array, faces: NDArray[np.int32], chart: Chart, uv: Arra
     return np.where(count > 0, total / np.maximum(count, 1), np.nan).reshape(uv.shape[:-1])
 
 
-def blend(mesh: Array, volume: Array, reach: float) -> tuple[Array, Array]:
+def blend(mesh: Array, volume: Array, reach: float | Array) -> tuple[Array, Array]:
     """Radii of the mesh where it is close to the volume, outside it or alone; of the volume elsewhere; a soft border.
 
     Args:
