@@ -139,4 +139,4 @@ def test_it_is_looked_for(scene: Scene, tmp_path: Path) -> None:
     given = params().model_copy(update={"reflection": reflection})
     fit = fit_explicit(replace(scene, poses=TURNED), given, tmp_path / "log").fit
     assert fit is not None
-    assert {"reflection", "no_reflection"} & {event["kind"] for event in fit["events"]}
+    assert {"reflection", "smooth_reflection", "no_reflection"} & {event["kind"] for event in fit["events"]}
