@@ -80,7 +80,7 @@ def blend(mesh: Array, volume: Array, reach: float | Array) -> tuple[Array, Arra
 
     Args:
         mesh, volume: radii, units, NaN where there is none.
-        reach: where the volume lies outside the mesh by more, units, it is believed.
+        reach: where the volume lies outside the mesh by more, units, it is believed; one number or (rows, columns).
 
     Returns:
         radii (NaN where neither has one), and the share of the mesh in them, 0 to 1.
