@@ -22,7 +22,7 @@ class StartParams(Section):
     """Candidates for a belt, degrees below level, tried with each centre beside the plain sphere. Below it rays start
     lower on the neck's axis."""
 
-    centre_tie: ClassVar[float] = 0.005
+    centre_tie: ClassVar[float] = 0.002
     """Of the charts within this of the least loss of visible surface, the one farthest back wins."""
 
     centre_nodes: ClassVar[int] = 96

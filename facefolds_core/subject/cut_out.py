@@ -46,7 +46,9 @@ class EdgeParams:
         alike: where no channel differs by so much, of values in [0, 1], and what stands behind is known as well.
         beside: pixels beside the subject by which that is told, standard deviation, at a picture of 384 pixels.
         noise: largest deviation of what stands behind that is reckoned with, of values in [0, 1].
-        agreeing: IoU of a silhouette with the Gaussians', under which it is not believed.
+        asked: IoU of a silhouette with the Gaussians', under which the picture is asked once more, with those of the
+            subject alone, and in the frame of the Gaussians not believed: they show that very moment.
+        agreeing: the same, under which no frame's is believed.
     """
 
     inside: float = 0.9
@@ -60,6 +62,7 @@ class EdgeParams:
     alike: float = 0.05
     beside: float = 6.0
     noise: float = 0.1
+    asked: float = 0.8
     agreeing: float = 0.65
 
 

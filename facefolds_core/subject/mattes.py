@@ -101,11 +101,11 @@ class Mattes:
         colours = self._colours
         cut = cut_out(picture, start, camera, colours, self.edge)
         share = agreement(cut, start > 0.5)
-        if share < self.edge.agreeing and self.alone is not None:
+        if share < self.edge.asked and self.alone is not None:
             start = self._alone_in(key)
             cut = cut_out(picture, start, camera, colours, self.edge)
             share = agreement(cut, start > 0.5)
-        if share < self.edge.agreeing:
+        if share < (self.edge.asked if key[1] == self.body.frame else self.edge.agreeing):
             return Matte(_bytes(start), "gaussians", share)
         return Matte(_bytes(softened(picture, cut, start, behind, camera, self.edge)), "picture", share)
 
