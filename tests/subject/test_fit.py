@@ -12,6 +12,7 @@ from facefolds_core.errors import UserError
 from facefolds_core.files.frame_store import write_frames
 from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.geometry.track import rotation
+from facefolds_core.subject import mattes as mattes_module
 from facefolds_core.subject.cut_out import EdgeParams, agreement
 from facefolds_core.subject.drawing import render
 from facefolds_core.subject.find import fit_room, pictures_of
@@ -116,20 +117,24 @@ def test_subject_mattes_and_what_stands_behind(scene: Scene, splats: Splats) -> 
     assert np.abs(behind - wall(scene.cameras[HELD]))[beside].mean() < 0.12
 
 
-def test_a_picture_that_contradicts_the_others_is_not_believed(scene: Scene, splats: Splats) -> None:
-    """What the Gaussians show takes its place."""
-    nobody = Body(splats, np.zeros(len(splats), bool), 0)
-    nobody.subject[np.linalg.norm(splats.means - np.array([-0.2, 0.3, 0.3]), axis=1) < 0.12] = True
-    found = Mattes(scene, body=nobody).of((HELD, 0))
-    assert found.agreement is not None
-    assert (found.source == "gaussians") == (found.agreement < 0.65)
+@pytest.mark.parametrize(
+    ("share", "frame", "source"),
+    [(0.7, 0, "gaussians"), (0.85, 0, "picture"), (0.7, 1, "picture"), (0.6, 1, "gaussians")],
+)
+def test_a_picture_that_contradicts_the_others_is_not_believed(
+    scene: Scene, splats: Splats, monkeypatch: pytest.MonkeyPatch, share: float, frame: int, source: str
+) -> None:
+    """What the Gaussians show takes its place: in their own frame sooner, since they show that very moment."""
+    monkeypatch.setattr(mattes_module, "agreement", lambda cut, other: share)
+    found = Mattes(scene, body=Body(splats, subject_of(splats, scene), frame)).of((HELD, 0))
+    assert (found.source, found.agreement) == (source, share)
 
 
 def test_a_picture_that_contradicts_the_first_fit_is_asked_of_the_subject_alone(scene: Scene, splats: Splats) -> None:
     masks = scene.open_masks()
     assert masks is not None
     true = masks.image(HELD, 0)[..., 0] > 127
-    mattes = Mattes(scene, body=body_among(scene, splats, 0), edge=EdgeParams(agreeing=1.01))  # none agrees
+    mattes = Mattes(scene, body=body_among(scene, splats, 0), edge=EdgeParams(asked=1.01))  # none agrees
     before, (colours, opacities) = mattes.of((HELD, 0)), cut_outs(scene)
     mattes.alone = fit_pictures(scene.cameras, colours, PARAMS, 0, opacities)
     found = mattes.of((HELD, 0))
