@@ -27,10 +27,6 @@ from facefolds_core.progress import progress
 AGGRESSIVENESS = (3, 5, 7)
 """Of the simplification, tried in turn until the target is reached."""
 
-STRAY = 0.5
-"""A vertex that lies farther from the surface, in edges of the mesh, is a spike: where a surface is flat the quadrics
-hardly say where along it, and at borders nor how far off it, a vertex belongs."""
-
 Array = NDArray[np.float64]
 
 
@@ -75,7 +71,6 @@ def decimate(surface: Surface, max_vertices: int, chart: Chart) -> Surface:
     Layers are level sets that the chart's rays meet once, so every face looks along them.
     """
     vertices, faces = surface.vertices.astype(np.float64), surface.faces.astype(np.intp)
-    tree = cKDTree(surface.vertices)
     # Euler: an open sheet has F = 2 V - 2 - B triangles, B its border vertices, a few times sqrt(V) after decimation.
     for attempt in AGGRESSIVENESS:
         target = min(2 * max_vertices, len(surface.faces))
@@ -83,28 +78,12 @@ def decimate(surface: Surface, max_vertices: int, chart: Chart) -> Surface:
             found, index = fast_simplification.simplify(
                 surface.vertices, surface.faces, target_count=target, agg=attempt
             )
-            found = without_spikes(found, index, tree)
             kept = index[upright_faces(found, index, chart)].astype(np.intp)
             vertices, faces = compact(found.astype(np.float64), largest_component(kept, len(found)))
             target -= max(1, 2 * (len(vertices) - max_vertices))
     if len(vertices) > max_vertices:
         faces = faces[:0]
     return Surface(vertices.astype(np.float32), faces.astype(np.int32))
-
-
-def without_spikes(vertices: NDArray[np.float32], faces: NDArray[np.int32], tree: cKDTree) -> NDArray[np.float32]:
-    """(V, 3): vertices over `STRAY` edges away from the surface are at its nearest vertex.
-
-    Args:
-        faces: (F, 3) of the decimated mesh; an edge is that of a median triangle.
-        tree: of the surface's vertices.
-    """
-    if not len(faces):
-        return vertices
-    a, b, c = vertices[faces].transpose(1, 0, 2).astype(np.float64)
-    edge = np.sqrt(np.median(np.linalg.norm(np.cross(b - a, c - a), axis=1)))
-    away, nearest = tree.query(vertices)
-    return np.where(away[:, None] > STRAY * edge, tree.data[nearest], vertices).astype(np.float32)
 
 
 def upright_faces(vertices: NDArray[np.float32], faces: NDArray[np.int32], chart: Chart) -> NDArray[np.bool_]:

@@ -33,6 +33,10 @@ MIN_COSINE = 0.02
 EMPTY_WEIGHT = 0.0001
 """Weight of a place that never shows."""
 
+LOOSE = 0.02
+"""Share of a radius by which a vertex may lie outside of what the samples around it have: on a sphere the corners of a
+triangle of 20 degrees do by 0.015. Beside a wall least squares would overshoot without end."""
+
 
 def refit_radii(sheets: Sheets, shows: Array, faces: NDArray[np.int64], uv: Array) -> Sheets:
     """The same sheets with new radii at the vertices that `faces` use, nested as before.
@@ -59,10 +63,24 @@ def refit_radii(sheets: Sheets, shows: Array, faces: NDArray[np.int64], uv: Arra
         normal = matrix.T @ diags(weights) @ matrix
         stay = diags(STAY * normal.diagonal() + 1e-6)
         right = matrix.T @ (weights * wanted) + stay @ (1 / radii[used])
-        fitted[layer] = 1 / spsolve((normal + stay).tocsc(), right)
+        nearest, farthest = _around(columns, np.repeat(radii[inside], 3), radii[used])
+        inverse = spsolve((normal + stay).tocsc(), right)
+        fitted[layer] = 1 / inverse.clip(1 / (farthest * (1 + LOOSE)), 1 / (nearest * (1 - LOOSE)))
     result = sheets.radii.reshape(sheets.num_layers, -1).copy()
     result[:, used] = np.minimum.accumulate(fitted, 0)
     return Sheets(**{**vars(sheets), "radii": result.reshape(sheets.radii.shape)})
+
+
+def _around(vertices: NDArray[np.int64], samples: Array, own: Array) -> tuple[Array, Array]:
+    """Least and greatest radius (V,) of the samples (S,) that have a share of each vertex, and of its own (V,).
+
+    Args:
+        vertices: (S,) which vertex.
+    """
+    nearest, farthest = own.copy(), own.copy()
+    np.minimum.at(nearest, vertices, samples)
+    np.maximum.at(farthest, vertices, samples)
+    return nearest, farthest
 
 
 def _shares(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.spatial import cKDTree
 
 from facefolds_core.errors import UserError
 from facefolds_core.export.decimation import (
@@ -13,7 +12,6 @@ from facefolds_core.export.decimation import (
     exact_st,
     nearest_st,
     upright_faces,
-    without_spikes,
 )
 from facefolds_core.export.poisson import gather_samples, reconstruct
 from facefolds_core.export.sampling import sample_grids
@@ -60,20 +58,6 @@ def test_faces_that_turn_over_or_have_no_area_are_found() -> None:
     vertices = np.array([[0.1, 0, 0], [0.1, 0.1, 0], [0.1, 0, 0.1], [0.1, 0.05, 0]], np.float32)
     faces = np.array([[0, 1, 2], [0, 2, 1], [0, 1, 1], [0, 3, 1]], np.int32)
     assert upright_faces(vertices, faces, CHART).tolist() == [True, False, False, False]
-
-
-def test_spikes_return_to_the_surface_and_nothing_else_moves() -> None:
-    """A square of 0.1 units, decimated to squares of 0.02: an edge is 0.02."""
-    fine, coarse = (
-        np.stack(np.meshgrid(t, t, [0.0]), -1).reshape(-1, 3) for t in (np.linspace(0, 0.1, n) for n in (51, 6))
-    )
-    corner = (np.arange(5)[:, None] * 6 + np.arange(5)).reshape(-1, 1)
-    faces = np.concatenate([np.add(corner, [0, 1, 6]), np.add(corner, [1, 7, 6])]).astype(np.int32)
-    bent = coarse.astype(np.float32)
-    bent[7, 2], bent[0] = 0.009, (-2.0, 0.3, 1.0)
-    found = without_spikes(bent, faces, cKDTree(fine))
-    assert np.array_equal(found[1:], bent[1:])
-    assert np.linalg.norm(fine - found[0], axis=1).min() < 1e-7
 
 
 def test_nearest_texture_coordinates_are_a_texel_centre_half_a_texel_away_at_most(grids: Grids) -> None:
