@@ -118,6 +118,17 @@ def test_vertices_gather_where_the_radius_jumps(sheets: Sheets) -> None:
     assert np.minimum(np.abs(radius - 0.3), np.abs(radius - 0.35)).max() < 2e-3
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_beside_walls_no_vertex_lies_beyond_what_was_sampled(sheets: Sheets, seed: int) -> None:
+    """Few samples show, as on a second surface: least squares alone reach several units."""
+    walls = rough(sheets, seed)
+    seldom = (np.random.default_rng(seed).random(walls.opacity[:2].shape) < 0.02) * np.uint8(255)
+    walls = replace(walls, opacity=seldom)
+    for mesh in decimated_ladder(walls, [256])[256]:
+        radius = np.linalg.norm(mesh.vertices - CENTRE, axis=-1)
+        assert 0.97 * 0.2 < radius.min() and radius.max() < 1.03 * 0.4
+
+
 def test_what_is_transparent_in_all_frames_is_trimmed(sheets: Sheets) -> None:
     opacity = np.zeros_like(sheets.opacity)
     opacity[0, 20:40, 20:40] = 1
