@@ -34,8 +34,8 @@ EMPTY_WEIGHT = 0.0001
 """Weight of a place that never shows."""
 
 LOOSE = 0.1
-"""Share of a radius by which a vertex may lie outside of what the samples around it have. With 0.02 the actor loses 0.06
-dB. Beside a wall, or where few samples show, least squares alone would overshoot without end."""
+"""Share of a radius by which a vertex may lie outside of what the samples around it have; with 0.02 the actor loses
+0.06 dB. Beside a wall, or where few samples show, least squares alone would overshoot without end."""
 
 
 def refit_radii(sheets: Sheets, shows: Array, faces: NDArray[np.int64], uv: Array) -> Sheets:
