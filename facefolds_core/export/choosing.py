@@ -16,6 +16,8 @@ from facefolds_core.facts import Fact, fact
 from facefolds_core.files.frame_store import FrameStore
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.meshes import TexturedMesh
+from facefolds_core.geometry.reflections import ReflectionMaps
+from facefolds_core.geometry.sphere_uv import Window
 from facefolds_core.rendering import Hits, composite
 from facefolds_core.rendering.raster import cast_layers
 from facefolds_core.rendering.reflection import reflected_colours
@@ -97,18 +99,23 @@ class Seen:
 
 
 def _seen(
-    scene: Scene, looks: Sequence[Look], meshes: Sequence[TexturedMesh], grids: Grids, textures: FrameStore
+    scene: Scene,
+    looks: Sequence[Look],
+    meshes: Sequence[TexturedMesh],
+    windows: Sequence[Window],
+    reflection: ReflectionMaps | None,
+    textures: FrameStore,
 ) -> list[Seen]:
     rng, layers = np.random.default_rng(0), sorted({layer for layer, _ in textures})
     images = {k: [textures.image(layer, k) for layer in layers] for k in {look.frame for look in looks}}
-    windows, found = [grids.window(i) for i in range(grids.num_layers)], []
+    found = []
     for look in looks:
         hits, own = cast_layers(look.camera, meshes), images[look.frame]
         pixels = hits.choose(rng, RAYS)
         photo = look.photo.reshape(-1, 3)[pixels]
-        if grids.reflection is not None:
+        if reflection is not None:
             to_room = None if scene.poses is None else scene.poses.at(look.frame).rotation
-            added = reflected_colours(hits, look.camera, windows, grids.reflection, to_room)
+            added = reflected_colours(hits, look.camera, windows, reflection, to_room)
             shine = composite(hits, own, added=added)[0] - composite(hits, own)[0]
             photo = photo - shine.reshape(-1, 3)[pixels]
         found.append(Seen(look, pixels, hits.at(pixels), own, photo))
@@ -163,6 +170,33 @@ def _least(
     }
 
 
+def _windows(grids: Grids) -> list[Window]:
+    return [grids.window(i) for i in range(grids.num_layers)]
+
+
+def explained(
+    scene: Scene,
+    meshes: Sequence[TexturedMesh],
+    windows: Sequence[Window],
+    reflection: ReflectionMaps | None,
+    textures: FrameStore,
+) -> float | None:
+    """How well an export shows the photos where it is opaque, on the views that choices are made on, dB; None where
+    nothing is opaque.
+
+    Args:
+        meshes, windows: of all layers, outermost first.
+        textures: layered store, N layers x K frames of (R, R, 4).
+    """
+    _, looks = looks_of(scene)
+    errors = []
+    for s in _seen(scene, looks, meshes, windows, reflection, textures):
+        rgb, alpha = composite(s.hits, s.images)
+        errors.append(((rgb[0] - s.photo)[alpha[0] > OPAQUE]).astype(np.float64).ravel() ** 2)
+    error = np.concatenate(errors)
+    return -10 * float(np.log10(max(error.mean(), 1e-10))) if len(error) else None
+
+
 def choose_meshes(
     scene: Scene,
     ladder: Mapping[int, Sequence[TexturedMesh]],
@@ -176,7 +210,7 @@ def choose_meshes(
         grids, textures: as they were sampled.
     """
     split, looks = looks_of(scene)
-    seen = _seen(scene, looks, ladder[max(MESHES)], grids, textures)
+    seen = _seen(scene, looks, ladder[max(MESHES)], _windows(grids), grids.reflection, textures)
 
     def pictures(candidate: int) -> list[Picture]:
         return [composite(cast_layers(s.look.camera, ladder[candidate]).at(s.pixels), s.images) for s in seen]
@@ -194,7 +228,7 @@ def choose_texels(scene: Scene, meshes: Sequence[TexturedMesh], grids: Grids, te
     """
     candidates = sorted({c for c in TEXELS if c < textures.height} | {textures.height})
     split, looks = looks_of(scene)
-    seen = _seen(scene, looks, meshes, grids, textures)
+    seen = _seen(scene, looks, meshes, _windows(grids), grids.reflection, textures)
     images = {s.look.frame: s.images for s in seen}
 
     def pictures(candidate: int) -> list[Picture]:

@@ -8,12 +8,14 @@ from facefolds_core.asset.glb import write_glb
 from facefolds_core.asset.reader import read_level
 from facefolds_core.captures.scene import read_scene
 from facefolds_core.config.stages import read_stage
+from facefolds_core.export.choosing import explained
 from facefolds_core.export.steps import TEXTURES
 from facefolds_core.export.stores import read_meshes, read_places
 from facefolds_core.files.frame_store import FrameStore
 from facefolds_core.files.paths import SubjectFolders
 from facefolds_core.packaging.notes import codec_warning
 from facefolds_core.packaging.package import Export, package
+from facefolds_core.packaging.settings import needed
 from facefolds_core.params import CompressParams
 
 
@@ -32,6 +34,9 @@ def compress(folders: SubjectFolders) -> str:
         },
         reflection=reflection,
     )
+    if params.video.target_psnr is not None:
+        shown = explained(scene, export.meshes, export.windows, export.reflection, export.textures)
+        params = needed(params, shown)
     manifest = package(folders.asset, export, scene, params)
     level = manifest.full
     write_glb(folders.glb, read_level(folders.asset, level), scene.subject, params.glb.frame)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from facefolds_core.captures.scene import Scene
 from facefolds_core.export import choosing, steps
-from facefolds_core.export.choosing import choose_meshes, choose_texels, looks_of
+from facefolds_core.export.choosing import choose_meshes, choose_texels, explained, looks_of
 from facefolds_core.export.poisson import gather_samples, reconstruct
 from facefolds_core.export.sampling import sample_grids
 from facefolds_core.export.sheets import grid_sheets
@@ -196,3 +196,16 @@ def test_what_was_chosen_is_said_and_kept(tmp_path: Path) -> None:
     assert "texture.resolution: auto took 8" in write_choice(tmp_path, why)
     assert read_json(tmp_path / "choice.json")["chosen"] == 8
     assert write_choice(tmp_path / "none", None) == "" and not (tmp_path / "none").exists()
+
+
+def test_how_well_an_export_shows_the_photos(tmp_path: Path) -> None:
+    filmed = film(tmp_path, 16.0, noise=20.0)
+    found = explained(filmed.scene, [ball(64)], [matte().window(0)], None, filmed.textures)
+    assert found == pytest.approx(20 * np.log10(255 / 20), abs=0.2)
+
+
+def test_nothing_is_said_of_an_export_that_is_clear(tmp_path: Path) -> None:
+    filmed = film(tmp_path, 16.0)
+    write_frames(tmp_path / "clear.arrow", (SIDE, SIDE, 4), [(0, 0, np.zeros((SIDE, SIDE, 4), np.uint8))])
+    textures = FrameStore(tmp_path / "clear.arrow")
+    assert explained(filmed.scene, [ball(64)], [matte().window(0)], None, textures) is None

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from facefolds_core.packaging.settings import fitted, level_params
+import pytest
+
+from facefolds_core.packaging.settings import fitted, level_params, needed
 from facefolds_core.params import CompressParams, LevelParams, MeshCodec, VideoCodec
 from tests.assets import cap_crops
 from tests.scenes import look_at_origin
@@ -43,3 +45,13 @@ def test_bits_of_a_mesh_follow_from_the_error_that_is_allowed() -> None:
     assert fitted(asked, layers, []) == asked  # nobody sees it
     exact = level_params(PARAMS.model_copy(update={"mesh": MeshCodec(max_error_pixels=None, quantization_bits=11)}))
     assert fitted(exact, layers, cameras) == exact
+
+
+@pytest.mark.parametrize("explained, target", [(35.0, 43.0), (28.04, 41.0), (20.0, 40.0), (None, 43.0)])
+def test_video_is_no_finer_than_the_models_error_asks_for(explained: float | None, target: float) -> None:
+    asked = PARAMS.model_copy(update={"video": PARAMS.video.model_copy(update={"target_psnr": 43.0})})
+    assert needed(asked, explained).video.target_psnr == target
+    low = asked.model_copy(update={"video": asked.video.model_copy(update={"target_psnr": 30.0})})
+    assert needed(low, explained).video.target_psnr == 30.0
+    constant = asked.model_copy(update={"video": asked.video.model_copy(update={"target_psnr": None})})
+    assert needed(constant, explained) is constant
