@@ -37,20 +37,17 @@ RAYS = 20_000
 OPAQUE = 0.9
 """Pixels count where the finest candidate is at least so opaque."""
 
-FIDELITY = 42.5
+FIDELITY = 42.0
 """Least PSNR of a candidate's pictures to those of the finest one, dB."""
 
 MESHES = (16, 24, 32, 48, 64)
 """R^m that are tried."""
 
-MESH_LOSS = 0.1
-"""Largest loss of PSNR against the photos of the meshes that are taken, to the best ones', dB."""
+LOSS = 0.1
+"""Largest loss of PSNR against the photos of what is taken, to the best candidate's, dB. The codec adds its own."""
 
 TEXELS = (128, 192, 256, 384, 512)
 """R^t that are tried, below that of the samples, which is tried, too."""
-
-TEXEL_LOSS = 0.05
-"""Largest loss of PSNR of the textures that are taken, to the best ones', dB. The codec adds a loss of its own."""
 
 
 @dataclass(frozen=True)
@@ -215,7 +212,7 @@ def choose_meshes(
     def pictures(candidate: int) -> list[Picture]:
         return [composite(cast_layers(s.look.camera, ladder[candidate]).at(s.pixels), s.images) for s in seen]
 
-    chosen, found = _least("decimate.resolution", MESHES, pictures, [s.photo for s in seen], MESH_LOSS)
+    chosen, found = _least("decimate.resolution", MESHES, pictures, [s.photo for s in seen], LOSS)
     return chosen, fact("resolution_chosen", **found, views=len(looks), split=split)
 
 
@@ -235,5 +232,5 @@ def choose_texels(scene: Scene, meshes: Sequence[TexturedMesh], grids: Grids, te
         small = {k: [resample(image, candidate) for image in frame] for k, frame in images.items()}
         return [composite(s.hits, small[s.look.frame]) for s in seen]
 
-    chosen, found = _least("texture.resolution", candidates, pictures, [s.photo for s in seen], TEXEL_LOSS)
+    chosen, found = _least("texture.resolution", candidates, pictures, [s.photo for s in seen], LOSS)
     return chosen, fact("resolution_chosen", **found, views=len(looks), split=split)

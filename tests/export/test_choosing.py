@@ -110,7 +110,6 @@ def test_photos_that_the_model_does_not_show_let_no_detail_go(tmp_path: Path, mo
     filmed = film(tmp_path, 8.0, noise=60.0)
     assert choose_texels(filmed.scene, [ball(64)], matte(), filmed.textures)[0] == 64
     monkeypatch.setattr(choosing, "FIDELITY", 0.0)
-    monkeypatch.setattr(choosing, "TEXEL_LOSS", 0.1)
     assert choose_texels(filmed.scene, [ball(64)], matte(), filmed.textures)[0] == 32
 
 
@@ -179,7 +178,7 @@ def test_coarser_levels_are_never_finer_than_the_full_one(
     scene = make_scene(tmp_path, cameras=3, size=40, frames=1)
     grids = sample_grids(Ellipsoids(), 32, (-0.5, 0.6, -0.3, 0.4))
     write_frames(tmp_path / "samples.arrow", (8, 8, 4), [(n, 0, np.full((8, 8, 4), 255, np.uint8)) for n in range(2)])
-    for name, value in {"MESHES": (8, 16), "MESH_LOSS": 50.0, "FIDELITY": 0.0}.items():
+    for name, value in {"MESHES": (8, 16), "LOSS": 50.0, "FIDELITY": 0.0}.items():
         monkeypatch.setattr(choosing, name, value)
     monkeypatch.setattr(steps, "MESHES", (8, 16))
     made = steps.decimate_all(
