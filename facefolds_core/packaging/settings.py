@@ -14,7 +14,7 @@ from facefolds_core.params import CompressParams, LevelParams
 MOST_BITS = 20
 
 HIDDEN = 14.0
-"""An error so many dB below the model's own adds less than 0.2 dB to it: finer video costs bytes that no score on photos sees.
+"""An error so many dB below the model's own adds under 0.2 dB to it: finer video is not seen by scores on photos.
 `sparse`, whose model has 27 dB: 40 instead of 43 dB take 39 % less, and 0.04 dB of 26.3 inside her outline."""
 
 LEAST_QUALITY = 40.0
