@@ -1,7 +1,6 @@
 """What a GPU gives the model `mlp`: `python -m bench.gpu data/actor/scene`, once the stage `normalize` has run.
 
-Of each preset and each device: rays that steps train on a second, memory, and what the whole training would take. With
-`--train` the preset `quick` is trained to its end on each device as well.
+Of each preset and each device: rays that steps train on a second, memory, and what the whole training would take.
 """
 
 from __future__ import annotations
@@ -14,7 +13,7 @@ from typing import Annotated
 import torch
 import typer
 
-from bench.tables import markdown, number, size
+from bench.tables import markdown, size
 from facefolds_core.captures.scene import Scene, read_scene
 from facefolds_core.errors import report_user_errors
 from facefolds_core.params import MlpParams, train_params
@@ -52,17 +51,9 @@ def row(scene: Scene, preset: str, device: str, seconds: float) -> tuple[str, ..
     return preset, device_name(torch.device(device)), f"{params.rays / step:.0f}", size(memory), whole
 
 
-def trained(scene: Scene, device: str) -> str:
-    with TemporaryDirectory() as folder:
-        places = [Path(folder) / name for name in ("model", "checkpoints", "log")]
-        report = loop.train(scene, settings("quick", device), *places)
-    return f"quick on {report.device}: {report.seconds:.0f} s, {number(report.final_psnr, 2)} dB of its rays"
-
-
 def main(
     scene: Annotated[Path, typer.Argument(help="Folder of a scene.")],
     seconds: Annotated[float, typer.Option(help="Of steps, for each preset and device.", min=0)] = 20,
-    train: Annotated[bool, typer.Option(help="Train `quick` to its end, too.")] = False,
 ) -> None:
     found = read_scene(scene)
     devices = ["cpu", *(["cuda"] if torch.cuda.is_available() else [])]
@@ -70,8 +61,6 @@ def main(
         markdown(HEAD, [row(found, preset, device, seconds) for preset in ("quick", "paper") for device in devices]),
         flush=True,
     )
-    for device in devices[::-1] if train else ():
-        print(trained(found, device))
 
 
 if __name__ == "__main__":
