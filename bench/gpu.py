@@ -57,10 +57,7 @@ def main(
 ) -> None:
     found = read_scene(scene)
     devices = ["cpu", *(["cuda"] if torch.cuda.is_available() else [])]
-    print(
-        markdown(HEAD, [row(found, preset, device, seconds) for preset in ("quick", "paper") for device in devices]),
-        flush=True,
-    )
+    print(markdown(HEAD, [row(found, preset, device, seconds) for preset in ("quick", "paper") for device in devices]))
 
 
 if __name__ == "__main__":

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-MOST = 3206
+MOST = 3203
 """Lines of Python. The aim is 2200: lower it with them, never raise it but for a new command that an issue asks for:
 `gate`, 220 lines, which took over from `rooms`, `large`, 88 (2400 before them), `start`, 134, `equal_bytes`, 146,
-`worth`, 230, when `decode`, 54, went, and `gpu`, 68."""
+`worth`, 230, when `decode`, 54, went, and `gpu`, 65."""
 
 
 def test_the_benchmarks_stay_small(project_root: Path) -> None:
