@@ -22,3 +22,10 @@ def chart_position(x, y, z, belt):  # type: ignore[no-untyped-def]
         r = math.sqrt(x * x + y * y + z * z)
         u = _TO_UV * math.asin(min(1.0, max(-1.0, z / r)))
     return u, v, r
+
+
+@inlined
+def chart_radius(x, y, z, belt):  # type: ignore[no-untyped-def]
+    """The radius of `chart_position` alone."""
+    flat = math.sqrt(x * x + y * y)
+    return flat * belt[2] if -z - flat * belt[1] > 0.0 else math.sqrt(x * x + y * y + z * z)

@@ -13,7 +13,7 @@ from torch import Tensor, nn
 from facefolds_core.geometry.chart import Chart
 from facefolds_core.geometry.sphere_uv import Window
 from facefolds_core.model.intersection import Crossings, search_interval
-from facefolds_core.model.radial_kernel import ceiling, crossing_distances
+from facefolds_core.model.radial_kernel import bounds, crossing_distances, heights
 
 MIN_SLOPE = 0.1
 """|d(r - rho) / d distance| is bounded below by this in gradients, as in `intersection`."""
@@ -104,11 +104,14 @@ class RadialManifolds(nn.Module):
         """`compiled_distances` with the surfaces as they are now, prepared for many calls."""
         rho = self.radii().detach().cpu().numpy()
         window, belt = np.array(self.window), self.chart.numbers
-        top, bound = ceiling(rho, window, belt), self.radius
+        cells, bound = bounds(rho), self.radius
+        high, whole = heights(rho, window, belt), int(np.isfinite(rho).all((0, 1)).sum())
 
         def distances(offsets: np.ndarray, directions: np.ndarray) -> np.ndarray:
             offsets, directions = np.ascontiguousarray(offsets), np.ascontiguousarray(directions)
-            found: np.ndarray = crossing_distances(offsets, directions, rho, window, belt, top, bound, STEP)
+            found: np.ndarray = crossing_distances(
+                offsets, directions, rho, window, belt, cells, high, whole, bound, STEP
+            )
             return found
 
         return distances

@@ -11,7 +11,7 @@ import numpy as np
 from numba import prange
 from numpy.typing import NDArray
 
-from facefolds_core.geometry.chart_kernel import chart_position
+from facefolds_core.geometry.chart_kernel import chart_position, chart_radius
 from facefolds_core.kernels.hit_codes import SCALE
 from facefolds_core.kernels.jit import compiled, inlined, kernel
 
@@ -40,42 +40,94 @@ def _look_up(rho, row, column, layer):  # type: ignore[no-untyped-def]
     return top * (1 - a) + bottom * a
 
 
-SKIP = 0.03
-"""Length of a stride through empty space, units."""
+SKIP = 0.02
+"""Length of a stride through empty space, units: a multiple of `radial.STEP`, so that samples stay where they were."""
 
-CEILING_CELLS = 128
-"""A side of `ceiling`, over u and v in [-2, 2]."""
+CELLS = 128
+"""A side of `heights`, over u and v in [-2, 2]."""
+
+HALVINGS = 6
+"""Of the range in which the least radius lies from which strides are safe."""
 
 
-def ceiling(rho: Array, window: Array, belt: Array) -> Array:
-    """(CEILING_CELLS, CEILING_CELLS) float32: a bound on the radii that a stride of SKIP from there can come near.
+def bounds(rho: Array) -> Array:
+    """(rows - 1, columns - 1, 2) float32: the largest and the smallest radius of any layer at a cell's four nodes."""
+    high, low = np.fmax.reduce(rho, axis=-1), np.fmin.reduce(rho, axis=-1)
+    corners = [np.s_[:-1, :-1], np.s_[:-1, 1:], np.s_[1:, :-1], np.s_[1:, 1:]]
+    return np.stack([np.maximum.reduce([high[c] for c in corners]), np.minimum.reduce([low[c] for c in corners])], -1)
 
-    Cell (i, j) covers u from the top and v from the left. Its value is the largest outermost radius at any grid node
-    within the cell or within the angle under which SKIP is seen from the rays' origin at the smallest radius; 0 where
-    the window is farther away than that.
+
+def heights(rho: Array, window: Array, belt: Array) -> Array:
+    """(2, CELLS, CELLS) float32: radii from which on no stride of SKIP, in any direction, meets a layer.
+
+    Cell (i, j) covers u from the top and v from the left. First those of all layers, then of layers that have holes.
+
+    Args:
+        rho, window, belt: as in `crossing_distances`.
     """
-    rows, columns = rho.shape[:2]
-    stride = SKIP * belt[2]
-    sliding = stride * belt[3] if math.isfinite(belt[1]) else 0.0
-    reach = max(math.asin(stride / max(float(rho[..., 0].min()) - stride, stride)), sliding)
-    reach = _TO_UV * reach + 4.0 / CEILING_CELLS
-    top = np.zeros((CEILING_CELLS, CEILING_CELLS), np.float32)
-    u = np.linspace(window[1], window[0], rows)
-    v = np.linspace(window[2], window[3], columns)
+    found = np.zeros((2, CELLS, CELLS), np.float32)
+    reach = SKIP * belt[2]
+    sliding = reach * belt[3] if math.isfinite(belt[1]) else 0.0
+    for own, some in zip(found, (rho, rho[..., np.isnan(rho).any((0, 1))]), strict=True):
+        if some.shape[-1]:
+            _heights(_coarse(bounds(some), window), reach, sliding, own)
+    return found
+
+
+@compiled
+def _coarse(cells: Any, window: Any) -> Any:
+    """The largest radius of any grid cell, of `bounds`, that touches a cell of `heights`; 0 where there is none."""
+    rows, columns = cells.shape[0], cells.shape[1]
+    found = np.zeros((CELLS, CELLS), np.float32)
+    down, across = (window[1] - window[0]) / rows, (window[3] - window[2]) / columns
+    for i in range(rows):
+        top, bottom = window[1] - i * down, window[1] - (i + 1) * down
+        for j in range(columns):
+            left = window[2] + j * across
+            for ci in range(_cell(2.0 - top), _cell(2.0 - bottom) + 1):
+                for cj in range(_cell(left + 2.0), _cell(left + across + 2.0) + 1):
+                    found[ci, cj] = max(found[ci, cj], cells[i, j, 0])
+    return found
+
+
+@inlined
+def _cell(place):  # type: ignore[no-untyped-def]
+    """Number of the cell of `heights` at a distance from its edge, in (u, v)."""
+    return min(max(int(place * 0.25 * CELLS), 0), CELLS - 1)
+
+
+@kernel(parallel=True)
+def _heights(coarse: Array, reach: float, sliding: float, found: Array) -> None:
+    """`heights` of some layers. A stride changes the radius by `reach` at most and, below the belt, u by `sliding`."""
+    for i in prange(CELLS):
+        for j in range(CELLS):
+            # The farther out, the narrower the angle in which a stride ends: a radius is high enough where all within
+            # the angle seen from there is lower.
+            low = coarse[i, j]
+            high = _highest(coarse, i, j, math.asin(reach / (low + reach)), sliding)
+            for _ in range(HALVINGS):
+                middle = 0.5 * (low + high)
+                if _highest(coarse, i, j, math.asin(reach / (middle + reach)), sliding) <= middle:
+                    high = middle
+                else:
+                    low = middle
+            found[i, j] = high + reach
+
+
+@compiled
+def _highest(coarse: Any, i: Any, j: Any, angle: Any, sliding: Any) -> Any:
+    """Largest radius within an angle, radians, of cell (i, j)."""
+    up = max(angle, sliding) * _TO_UV
+    steps = math.ceil(up * 0.25 * CELLS)
     # Meridians converge: the same angle spans more of v towards the poles.
-    shrink = math.cos(math.pi / 2 * min(0.95, max(abs(window[0]), abs(window[1])) + reach))
-    edges = np.linspace(-2, 2, CEILING_CELLS + 1)
-    for i in range(CEILING_CELLS):
-        high, low = -edges[i], -edges[i + 1]
-        r = np.flatnonzero((u >= low - reach) & (u <= high + reach))
-        if len(r) == 0:
-            continue
-        band = rho[r[0] : r[-1] + 1, :, 0].max(0)
-        for j in range(CEILING_CELLS):
-            c = np.flatnonzero((v >= edges[j] - reach / shrink) & (v <= edges[j + 1] + reach / shrink))
-            if len(c):
-                top[i, j] = band[c[0] : c[-1] + 1].max()
-    return top
+    height = max(abs(2.0 - i * 4.0 / CELLS), abs(2.0 - (i + 1) * 4.0 / CELLS))
+    aside = angle * _TO_UV / math.cos(0.5 * math.pi * min(0.95, height + up))
+    aside_steps = min(math.ceil(aside * 0.25 * CELLS), CELLS // 2)
+    found = coarse[i, j]
+    for ci in range(max(i - steps, 0), min(i + steps, CELLS - 1) + 1):
+        for step in range(-aside_steps, aside_steps + 1):
+            found = max(found, coarse[ci, (j + step) % CELLS])
+    return found
 
 
 @kernel(parallel=True)
@@ -85,7 +137,9 @@ def crossing_distances(
     rho: Array,  # (rows, columns, N) radii, outermost first, NaN where a layer has none, float32
     window: Array,  # (4,) u0, u1, v0, v1
     belt: Array,  # (4,) of `Chart.numbers`
-    ceiling: Array,  # of `ceiling`
+    cells: Array,  # of `bounds`
+    heights: Array,  # of `heights`
+    whole: int,  # layers that have no holes
     bound: float,
     step: float,
 ) -> Array:
@@ -97,8 +151,7 @@ def crossing_distances(
     """
     result = np.zeros((offsets.shape[0], rho.shape[2]), np.float32)
     for ray in prange(offsets.shape[0]):
-        one, other = np.empty(rho.shape[2], np.float64), np.empty(rho.shape[2], np.float64)
-        cross(ray, offsets, directions, rho, window, belt, ceiling, bound, step, result, one, other)
+        cross(ray, offsets, directions, rho, window, belt, cells, heights, whole, bound, step, result)
     return result
 
 
@@ -110,16 +163,15 @@ def cross(
     rho: Any,
     window: Any,
     belt: Any,
-    ceiling: Any,
+    cells: Any,
+    heights: Any,
+    whole: Any,
     bound: Any,
     step: Any,
     result: Any,
-    previous: Any,
-    current: Any,
 ) -> None:
-    """`crossing_distances` of one ray, into result, which is 0. Scratch: two arrays (N,) float64."""
+    """`crossing_distances` of one ray, into result, which is 0."""
     rows, columns, layers = rho.shape
-    cells = ceiling.shape[0]
     ox, oy, oz = offsets[ray, 0], offsets[ray, 1], offsets[ray, 2]
     dx, dy, dz = directions[ray, 0], directions[ray, 1], directions[ray, 2]
     along = ox * dx + oy * dy + oz * dz
@@ -135,18 +187,18 @@ def cross(
             far = min(far, -ox / dx)
     if far <= near:
         return
-    found = 0
+    found, found_whole = 0, 0
     last = -1.0  # distance of the last sample inside the window; < 0: none
-    state = 0  # of that sample: 1 above all layers, 2 below all, 3 among them
+    state = 0  # of that sample: 1 above all layers of its cell, 2 below all, 3 perhaps among them
     row_before = 0.0
     column_before = 0.0
+    radius_before = 0.0
     s = near
     while True:
         x, y, z = ox + s * dx, oy + s * dy, oz + s * dz
         u, v, r = chart_position(x, y, z, belt)
-        ci = min(max(int((2.0 - u) * 0.25 * cells), 0), cells - 1)
-        cj = min(max(int((v + 2.0) * 0.25 * cells), 0), cells - 1)
-        if r - SKIP * belt[2] > ceiling[ci, cj]:
+        ci, cj = _cell(2.0 - u), _cell(v + 2.0)
+        if r > heights[int(found_whole == whole), ci, cj]:
             last = -1.0
             if s >= far:
                 break
@@ -158,13 +210,7 @@ def cross(
         else:
             i = min(int(row), rows - 2)
             j = min(int(column), columns - 2)
-            a, b = row - i, column - j
-            w00, w01, w10, w11 = (1 - a) * (1 - b), (1 - a) * b, a * (1 - b), a * b
-            for n in range(layers):
-                current[n] = r - (
-                    w00 * rho[i, j, n] + w01 * rho[i, j + 1, n] + w10 * rho[i + 1, j, n] + w11 * rho[i + 1, j + 1, n]
-                )
-            now = 1 if current[0] >= 0.0 else (2 if current[layers - 1] < 0.0 else 3)
+            now = 1 if r >= cells[i, j, 0] else (2 if r < cells[i, j, 1] else 3)
             if last >= 0.0 and (now != state or now == 3):
                 # Grid position along the bracket: a parabola through its ends and its middle.
                 t = 0.5 * (last + s)
@@ -174,10 +220,14 @@ def cross(
                 bend_row = 2.0 * (row_before + row) - 4.0 * mid_row
                 bend_column = 2.0 * (column_before + column) - 4.0 * mid_column
                 for n in range(layers):
-                    if math.isnan(previous[n] + current[n]):  # no surface there
+                    if result[ray, n] != 0.0:
                         continue
-                    if result[ray, n] == 0.0 and (previous[n] >= 0.0) != (current[n] >= 0.0):
-                        fa, fb, ga, gb = 0.0, 1.0, previous[n], current[n]
+                    before = radius_before - _look_up(rho, row_before, column_before, n)
+                    after = r - _look_up(rho, row, column, n)
+                    if math.isnan(before + after):  # no surface there
+                        continue
+                    if (before >= 0.0) != (after >= 0.0):
+                        fa, fb, ga, gb = 0.0, 1.0, before, after
                         f = 0.0
                         for _ in range(8):
                             f = fa + (fb - fa) * (ga / (ga - gb))
@@ -185,7 +235,7 @@ def cross(
                             x, y, z = ox + d * dx, oy + d * dy, oz + d * dz
                             at_row = row_before + f * (row - row_before + bend_row * (f - 1.0))
                             at_column = column_before + f * (column - column_before + bend_column * (f - 1.0))
-                            _, _, at_radius = chart_position(x, y, z, belt)
+                            at_radius = chart_radius(x, y, z, belt)
                             gm = at_radius - _look_up(rho, at_row, at_column, n)
                             if abs(gm) < 1e-6 or math.isnan(gm):
                                 break
@@ -197,12 +247,12 @@ def cross(
                                 ga *= 0.5
                         result[ray, n] = last + f * (s - last)
                         found += 1
+                        found_whole += int(n < whole)
                 if found == layers:
                     break
             state = now
             last = s
-            row_before, column_before = row, column
-            previous, current = current, previous
+            row_before, column_before, radius_before = row, column, r
         if s >= far:
             break
         s = min(s + step, far)
