@@ -1,4 +1,4 @@
-"""Cameras that nobody filmed with: where they stand, and how large they see the subject."""
+"""Cameras that nobody filmed with: where they stand, how large they see the subject, and what they are asked for."""
 
 from __future__ import annotations
 
@@ -7,24 +7,31 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import ndimage
 from scipy.spatial import Delaunay
 
 from facefolds_core.geometry.cameras import Camera
+from facefolds_core.subject.drawing import render
 from facefolds_core.subject.splats import Splats
 
 Array = NDArray[np.float64]
 
 GAP = 15.0
 """Degrees, seen from the subject: gaps between cameras that are wider get a virtual one."""
-FEW, VIEWS = 16, 24
-"""Up to so many cameras there are virtual ones, too, until there are so many in all: more photos than these say more
-than Gaussians do (the actor with 22 lost 0.2 dB over any background by two virtual ones)."""
+VIEWS = 16
+"""Virtual cameras, at most."""
+FEW = 12
+"""They are asked for places that fewer cameras see: what more cameras see, photos say better than Gaussians do."""
+HIDDEN = 0.01
+"""What lies so far behind the subject's surface, units, a camera does not see."""
 DIRECTIONS = 3000
 """Places that are tried, evenly on the sphere: 4 degrees apart."""
 SLOPE = 0.2
 """Least cosine of the angle between a place and the cameras' mean direction."""
 SMALLEST = 0.01
 """Least radius that a subject is taken to have, units."""
+SOLID = 0.5
+"""Opacity from which a pixel shows the subject."""
 QUANTILE = 0.01
 """Share of the Gaussians on each side that the subject's box leaves out."""
 
@@ -49,15 +56,55 @@ def virtual_cameras(real: Sequence[Camera], splats: Splats, size: tuple[int, int
     return tuple(_aimed(f"virtual {n}", middle + away * d, middle, K, size) for n, d in enumerate(places))
 
 
+def seen_by_few(cameras: Sequence[Camera], real: Sequence[Camera], splats: Splats) -> NDArray[np.bool_]:
+    """(V, H, W) pixels of virtual cameras whose place fewer than `FEW` real ones see; beside the subject that of the
+    nearest pixel which shows it.
+
+    Args:
+        cameras: V of them, with pictures of one size.
+        real: training cameras.
+        splats: the subject.
+    """
+    surfaces = [render(splats, camera)[2] for camera in real]
+    return np.array([_seen_by_few(camera, real, surfaces, splats) for camera in cameras])
+
+
+def _seen_by_few(
+    camera: Camera, real: Sequence[Camera], surfaces: Sequence[NDArray[np.float32]], splats: Splats
+) -> NDArray[np.bool_]:
+    """(H, W) of one; surfaces are the subject's depths in the real cameras."""
+    _, opacity, depth = render(splats, camera)
+    rows, columns = np.nonzero(opacity > SOLID)
+    if not len(rows):
+        return np.zeros(opacity.shape, bool)
+    origins, directions = camera.rays(np.stack([columns, rows], -1) + 0.5)
+    points = origins + directions * (depth[rows, columns] / (directions @ camera.rotation[2]))[:, None]
+    count = np.zeros(opacity.shape, int)
+    count[rows, columns] = sum(
+        _sees(other, surface, points).astype(int) for other, surface in zip(real, surfaces, strict=True)
+    )
+    nearest = ndimage.distance_transform_edt(opacity <= SOLID, return_distances=False, return_indices=True)
+    return np.asarray(count[tuple(nearest)] < FEW)
+
+
+def _sees(camera: Camera, surface: NDArray[np.float32], points: Array) -> NDArray[np.bool_]:
+    """(P,) whether a camera, whose depths (H, W) are given, sees points (P, 3)."""
+    places, depth = camera.project(points)
+    columns, rows = np.floor(places).clip(-1, [camera.width, camera.height]).astype(int).T
+    inside = (depth > 0) & (columns >= 0) & (rows >= 0) & (columns < camera.width) & (rows < camera.height)
+    inside[inside] = depth[inside] < surface[rows[inside], columns[inside]] + HIDDEN
+    return inside
+
+
 def _places(real: Array) -> list[Array]:
     """Unit directions of the virtual cameras, given those of the real ones (C, 3)."""
-    if not 3 <= len(real) <= FEW:
+    if len(real) < 3:
         return []
     tried = _sphere(DIRECTIONS)
     wanted = tried[_between(tried, real)]
     nearest = (wanted @ real.T).max(1, initial=-1)
     chosen: list[Array] = []
-    while len(chosen) < min(VIEWS - len(real), len(wanted)):
+    while len(chosen) < min(VIEWS, len(wanted)):
         farthest = int(nearest.argmin())
         if nearest[farthest] > math.cos(math.radians(GAP)):
             break

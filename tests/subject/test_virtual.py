@@ -2,17 +2,28 @@
 
 from __future__ import annotations
 
-import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from facefolds_core.subject.splats import Splats
-from facefolds_core.subject.virtual import FEW, GAP, VIEWS, virtual_cameras
+from facefolds_core.subject.virtual import FEW, GAP, VIEWS, seen_by_few, virtual_cameras
 from tests.scenes import look_at_origin
 from tests.subject.splats import some_splats
 
 SUBJECT = Splats(some_splats(400), np.zeros(3, np.float32))
+
+
+def slab() -> Splats:
+    """Opaque Gaussians on two squares, 0.2 units apart along x."""
+    places = np.stack(np.meshgrid([-0.1, 0.1], *2 * [np.linspace(-0.2, 0.2, 31)], indexing="ij"), -1).reshape(-1, 3)
+    values = some_splats(len(places))
+    values[:, :3], values[:, 3:6], values[:, 6:11] = places, np.log(0.012), [1, 0, 0, 0, 5]
+    return Splats(values, np.zeros(3, np.float32))
+
+
+SLAB = slab()
 
 
 def directions(cameras) -> np.ndarray:  # type: ignore[no-untyped-def]
@@ -27,7 +38,7 @@ def degrees(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 def test_wide_gaps_are_filled_and_nothing_beyond_the_cameras() -> None:
     real = [look_at_origin(f"c{a}{e}", a, e, 48) for a in (-45, 0, 45) for e in (-10, 15)]
     found = virtual_cameras(real, SUBJECT, (48, 64))
-    assert 0 < len(found) <= VIEWS - len(real)
+    assert 0 < len(found) <= VIEWS
     apart = degrees(directions(found), directions(real))
     assert apart.min() > 0.8 * GAP  # the subject's middle is not quite the origin
     azimuths = np.degrees(np.arctan2(directions(found)[:, 1], directions(found)[:, 0]))
@@ -36,12 +47,31 @@ def test_wide_gaps_are_filled_and_nothing_beyond_the_cameras() -> None:
     assert degrees(between, np.concatenate([directions(real), directions(found)])).min() < GAP
 
 
-def test_where_there_are_many_cameras_or_no_gaps_there_is_none() -> None:
-    many = [look_at_origin(f"c{a}", a, 20 * math.sin(a), 48) for a in np.linspace(-60, 60, FEW + 1)]
-    assert not virtual_cameras(many, SUBJECT, (48, 48))
+def test_where_there_are_no_gaps_or_too_few_cameras_to_stand_between_there_is_none() -> None:
     close = [look_at_origin(f"c{a}{e}", a, e, 48) for a in (-10, 0, 10) for e in (-10, 0, 10)]
     assert not virtual_cameras(close, SUBJECT, (48, 48))
-    assert not virtual_cameras(close[:2], SUBJECT, (48, 48))
+    apart = [look_at_origin(f"c{a}", a, 0, 48) for a in (-40, 40)]
+    assert not virtual_cameras(apart, SUBJECT, (48, 48))
+
+
+def test_places_are_asked_for_that_few_cameras_see() -> None:
+    """Right of the subject's middle, where one camera's picture ends; all around are as many as are many."""
+    view = look_at_origin("virtual", 0, 0, 48)
+    many = [look_at_origin(f"c{n}", n, 0, 48) for n in range(FEW)]
+    assert not seen_by_few([view], many, SLAB).any()
+    K = many[0].K.copy()
+    K[0, 2] += 24  # its left half is what it sees: the subject's right lies beyond its picture
+    half = replace(many[0], K=K)
+    found = seen_by_few([view], [half, *many[1:]], SLAB)[0]
+    assert found[:, 30:].all() and not found[:, :18].any()
+    assert seen_by_few([view], many[1:], SLAB).all()
+
+
+def test_what_lies_behind_the_subject_is_not_seen_from_before_it() -> None:
+    view = look_at_origin("virtual", 180, 0, 48)
+    before = [look_at_origin(f"c{n}", n, 0, 48) for n in range(FEW)]
+    assert seen_by_few([view], before, SLAB).all()
+    assert not seen_by_few([view], [view] * FEW, SLAB).any()
 
 
 @pytest.mark.parametrize("size", [(48, 64), (64, 48)])

@@ -1,9 +1,9 @@
 """Views that nobody filmed: the subject's Gaussians, seen from between the cameras.
 
 Few photos do not say what layers look like from between them: each camera can be shown a picture of its own. Gaussians
-have no such freedom, and what they show from there is nearer to the truth (docs/research/few-cameras.md). So their
-pictures are targets beside the photos, in each frame. The Gaussians of frames that differ also say how far the surface
-moves, and so how far apart the layers must lie.
+have no such freedom, and what they show from there is nearer to the truth (docs/research/few-cameras.md). So where few
+cameras look, their pictures are targets beside the photos, in each frame. The Gaussians of frames that differ also say
+how far the surface moves, and so how far apart the layers must lie.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from facefolds_core.subject.found import reference_frame
 from facefolds_core.subject.frames import changed_to, mean_errors, ridden, targets_of
 from facefolds_core.subject.splats import Splats
 from facefolds_core.subject.storage import FoundSubject
-from facefolds_core.subject.virtual import virtual_cameras
+from facefolds_core.subject.virtual import seen_by_few, virtual_cameras
 from facefolds_core.training.explicit.warnings import MIN_START_PSNR
 from facefolds_core.training.likeness import comparable, farthest_first, likenesses
 
@@ -39,11 +39,13 @@ class Virtual:
     Attributes:
         cameras: V of them, in the head's own frame.
         mattes: (V, H, W) of the subject in the frame of the start.
-        apart: one of so many of their pixels is looked at, so that they count no more than the photos.
+        wanted: (V, H, W) which of their pixels are asked for.
+        apart: one of so many of these is looked at, so that they count no more than the photos.
     """
 
     cameras: tuple[Camera, ...]
     mattes: Image
+    wanted: NDArray[np.bool_]
     apart: int
 
 
@@ -69,7 +71,9 @@ class Teacher:
         cameras = virtual_cameras(real, splats, (scene.width, scene.height)) if self._believed else ()
         self._views = [view_of(camera) for camera in cameras]
         mattes = self._drawn(splats)[..., 3].reshape(len(cameras), scene.height, scene.width)
-        self.virtual = Virtual(cameras, mattes, max(1, math.ceil(len(cameras) / max(1, len(real)))))
+        wanted = seen_by_few(cameras, real, splats).reshape(mattes.shape)
+        photos = max(1, len(real) * scene.height * scene.width)
+        self.virtual = Virtual(cameras, mattes, wanted, max(1, math.ceil(wanted.sum() / photos)))
 
     def others(self, photos: Callable[[int], Image]) -> list[Splats]:
         """The Gaussians of the `OTHERS` frames that look least like that of the start and one another. From then on it

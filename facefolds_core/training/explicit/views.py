@@ -115,8 +115,7 @@ class Tracer:
             fine: whether pixels at outlines have finer rays.
         """
         camera = self._camera(position, frames[0])
-        stride *= 1 if self._virtual is None or position < len(self._real) else self._virtual.apart
-        pixels = np.arange(first, camera.height * camera.width, stride)
+        pixels = self._pixels(position, first, stride)
         centres = np.stack([pixels % camera.width, pixels // camera.width], -1) + 0.5
         codes, directions = self._codes(camera, centres)
         around = np.flatnonzero(self._outline(position, frames).ravel()[pixels]) if fine else np.zeros(0, np.int64)
@@ -128,6 +127,14 @@ class Tracer:
         own = np.full(len(pixels), position, np.int32)
         along = directions.astype(np.float32)
         return Views(codes, finer, which, own, pixels.astype(np.int32), along).part(np.flatnonzero(hit))
+
+    def _pixels(self, position: int, first: int, stride: int) -> NDArray[np.int64]:
+        """Numbers of those that are looked at."""
+        count = self._scene.height * self._scene.width
+        if position < len(self._real) or self._virtual is None:
+            return np.arange(first, count, stride)
+        pixels = np.arange(first, count, stride * self._virtual.apart)
+        return pixels[self._virtual.wanted[position - len(self._real)].ravel()[pixels]]
 
     def _codes(self, camera: Camera, places: NDArray[np.floating]) -> tuple[NDArray[np.uint16], Array]:
         """(R, N, 2) of rays through places (R, 2), and their directions (R, 3)."""
