@@ -77,7 +77,7 @@ def _seen_by_few(
     rows, columns = np.nonzero(opacity > SOLID)
     if not len(rows):
         return np.zeros(opacity.shape, bool)
-    origins, directions = camera.rays(np.stack([columns, rows], -1) + 0.5)
+    origins, directions = camera.rays(np.stack([columns, rows], -1).astype(np.float64) + 0.5)
     points = origins + directions * (depth[rows, columns] / (directions @ camera.rotation[2]))[:, None]
     count = np.zeros(opacity.shape, int)
     count[rows, columns] = sum(
@@ -93,7 +93,7 @@ def _sees(camera: Camera, surface: NDArray[np.float32], points: Array) -> NDArra
     columns, rows = np.floor(places).clip(-1, [camera.width, camera.height]).astype(int).T
     inside = (depth > 0) & (columns >= 0) & (rows >= 0) & (columns < camera.width) & (rows < camera.height)
     inside[inside] = depth[inside] < surface[rows[inside], columns[inside]] + HIDDEN
-    return inside
+    return np.asarray(inside)
 
 
 def _places(real: Array) -> list[Array]:

@@ -134,7 +134,8 @@ class Tracer:
         if position < len(self._real) or self._virtual is None:
             return np.arange(first, count, stride)
         pixels = np.arange(first, count, stride * self._virtual.apart)
-        return pixels[self._virtual.wanted[position - len(self._real)].ravel()[pixels]]
+        wanted = self._virtual.wanted[position - len(self._real)].ravel()
+        return np.asarray(pixels[wanted[pixels]])
 
     def _codes(self, camera: Camera, places: NDArray[np.floating]) -> tuple[NDArray[np.uint16], Array]:
         """(R, N, 2) of rays through places (R, 2), and their directions (R, 3)."""
