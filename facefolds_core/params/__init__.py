@@ -32,6 +32,7 @@ from facefolds_core.params.export import (
 )
 from facefolds_core.params.gaussians import SubjectParams
 from facefolds_core.params.mlp import MlpParams
+from facefolds_core.params.pruning import PruningParams
 from facefolds_core.params.reflection import ReflectionParams
 from facefolds_core.params.sections import SECTIONS, STAGE_SECTIONS, section_of, train_params, user_error
 from facefolds_core.params.segments import SegmentParams
@@ -64,6 +65,7 @@ __all__ = [
     "NormalizeParams",
     "Overrides",
     "Preset",
+    "PruningParams",
     "ReconstructParams",
     "ReflectionParams",
     "SampleParams",
