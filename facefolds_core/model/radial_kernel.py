@@ -139,7 +139,7 @@ def crossing_distances(
     belt: Array,  # (4,) of `Chart.numbers`
     cells: Array,  # of `bounds`
     heights: Array,  # of `heights`
-    whole: int,  # layers that have no holes
+    whole: int,  # layers that have no holes; they come first
     bound: float,
     step: float,
 ) -> Array:

@@ -65,7 +65,7 @@ def seen_by_few(cameras: Sequence[Camera], real: Sequence[Camera], splats: Splat
         real: training cameras.
         splats: the subject.
     """
-    surfaces = [render(splats, camera)[2] for camera in real]
+    surfaces = [render(splats, camera)[2] for camera in real] if cameras else []
     return np.array([_seen_by_few(camera, real, surfaces, splats) for camera in cameras])
 
 
