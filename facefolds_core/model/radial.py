@@ -62,6 +62,7 @@ class RadialManifolds(nn.Module):
         self.middle = nn.Parameter(middle.clone())
         self.halfwidth = nn.Parameter(halfwidth.clone())
         self.register_buffer("second", None if second is None else second.clone())
+        self._prepared: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None  # radii, their `bounds`, `heights`
 
     @property
     def radius(self) -> float:
@@ -103,9 +104,11 @@ class RadialManifolds(nn.Module):
     def tracer(self) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
         """`compiled_distances` with the surfaces as they are now, prepared for many calls."""
         rho = self.radii().detach().cpu().numpy()
-        window, belt = np.array(self.window), self.chart.numbers
-        cells, bound = bounds(rho), self.radius
-        high, whole = heights(rho, window, belt), int(np.isfinite(rho).all((0, 1)).sum())
+        window, belt, bound = np.array(self.window), self.chart.numbers, self.radius
+        if self._prepared is None or not np.array_equal(self._prepared[0], rho, equal_nan=True):
+            self._prepared = rho, bounds(rho), heights(rho, window, belt)
+        _, cells, high = self._prepared
+        whole = int(np.isfinite(rho).all((0, 1)).sum())
 
         def distances(offsets: np.ndarray, directions: np.ndarray) -> np.ndarray:
             offsets, directions = np.ascontiguousarray(offsets), np.ascontiguousarray(directions)

@@ -66,6 +66,18 @@ def test_compiled_search_matches_the_reference() -> None:
     assert error.median() < 1e-6
 
 
+def test_layers_that_moved_are_met_where_they_are_now() -> None:
+    manifolds, moved = _spheres(), _spheres()
+    origins, directions = _rays(200)
+    with torch.no_grad():
+        before = manifolds.crossings(origins, directions).distance
+        for one in (manifolds, moved):
+            one.middle -= 0.05
+        after = manifolds.crossings(origins, directions).distance
+        assert torch.equal(after, moved.crossings(origins, directions).distance)
+    assert (after > before + 0.01).any()
+
+
 def test_layers_are_nested() -> None:
     radii = _bumpy().radii()
     assert (radii[..., :-1] > radii[..., 1:]).all()
