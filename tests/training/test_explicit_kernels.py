@@ -42,7 +42,7 @@ def _problem(rays: int, layers: int, shape: tuple[int, int]) -> dict[str, np.nda
         "pixel": np.arange(rays, dtype=np.int32),
         "rays": np.arange(rays),
         "cut": random_cut(rng, (1, rays)),
-        "behind": rng.random((1, 3), np.float32),
+        "behind": rng.random((1, 4), np.float32),
         "texture": texture,
         "shine": rng.random((rays, 3), np.float32) * 0.4 - 0.2,
     }

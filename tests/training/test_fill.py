@@ -61,10 +61,13 @@ def test_steps_draw_opacity_back_to_what_is_believed() -> None:
 class OneColour:
     """A picture of one pixel."""
 
-    behind = np.full((1, 3), 0.5, np.float32)
+    behind = np.array([[0.5, 0.5, 0.5, 0]], np.float32)
 
     def cut(self, index: int) -> np.ndarray:
         return np.full((1, 1, 4), 255, np.uint8)
 
     def shuffle(self, random: np.random.Generator) -> None:
+        pass
+
+    def average(self) -> None:
         pass

@@ -13,6 +13,7 @@ from facefolds_core.training.explicit import follow_kernel, reference, shading_k
 from facefolds_core.training.explicit.follow import _apart, _met, follow, follow_frame, lagging, mean_errors
 from facefolds_core.training.explicit.rates import ALPHA_RATE, BETAS
 from facefolds_core.training.explicit.state import MIN_LIGHT, TextureState
+from facefolds_core.training.explicit.targets import ALL_COLOURS
 from facefolds_core.training.explicit.views import StillRays, Views
 
 PARAMS = ExplicitParams()
@@ -85,7 +86,7 @@ class Film:
     another colour."""
 
     shape, frames, moved, rays = (16, 16), 5, 3, 6000
-    behind = np.full((1, 3), 0.5, np.float32)
+    behind = np.zeros((1, 4), np.float32)
     usual, other = np.array([0.8, 0.6, 0.5]), np.array([0.2, 0.3, 0.1])
 
     def __init__(self, noise: float = 0.0) -> None:
@@ -104,8 +105,8 @@ class Film:
         opaque = np.full((self.rays, 1), 255)
         return np.concatenate([self.images[index], opaque], -1).astype(np.uint8)[None]
 
-    def shuffle(self, random: np.random.Generator) -> None:
-        self.behind = random.random((1, 3), np.float32)
+    def average(self) -> None:
+        self.behind[:] = ALL_COLOURS
 
     def state(self) -> TextureState:
         start = torch.tensor([*self.usual, 0.5], dtype=torch.float32).expand(2, 2, 4)
@@ -187,7 +188,7 @@ def test_texels_with_a_gradient_are_all_known() -> None:
     sums = np.zeros((LAYERS, *SHAPE, 4), np.float32)
     rays = views.arrays
     blank, none = np.zeros((1, 40, 4), np.uint8), np.zeros((0, 3), np.float32)
-    behind, texture = np.zeros((1, 3), np.float32), random_texture() * 0.3
+    behind, texture = np.zeros((1, 4), np.float32), random_texture() * 0.3
     shading_kernel.shade(*rays, np.arange(40), blank, behind, texture, none, sums, 0.0, 0.0, True)
     met = np.flatnonzero(sums[..., 3].sum(0).ravel())
     assert not np.setdiff1d(met, _met(views, SHAPE)).size

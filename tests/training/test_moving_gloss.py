@@ -59,12 +59,15 @@ def test_a_turned_head_mirrors_what_is_there_in_the_room(scene: Scene) -> None:
 class Noise:
     """Other pictures in each frame."""
 
-    behind = np.full((6, 3), 0.5, np.float32)
+    behind = np.tile(np.array([0.5, 0.5, 0.5, 0], np.float32), (6, 1))
 
     def cut(self, index: int) -> np.ndarray:
         return random_cut(np.random.default_rng(index), (6, 24 * 24))
 
     def shuffle(self, random: np.random.Generator) -> None:
+        """They stay over grey."""
+
+    def average(self) -> None:
         """They stay over grey."""
 
 

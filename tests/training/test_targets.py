@@ -13,6 +13,7 @@ from facefolds_core.captures.scene import Scene
 from facefolds_core.files.frame_store import write_frames
 from facefolds_core.subject.found import reference_frame
 from facefolds_core.subject.splats import MEAN, Splats
+from facefolds_core.training.explicit import shading_kernel
 from facefolds_core.training.explicit.targets import CutOuts
 from facefolds_core.training.explicit.teacher import OTHERS, Teacher
 from facefolds_core.training.explicit.warnings import MIN_START_PSNR
@@ -78,9 +79,34 @@ def test_each_step_has_other_colours_for_each_camera(scene: Scene) -> None:
     images, random = CutOuts(scene), np.random.default_rng(0)
     images.shuffle(random)
     before = images.behind.copy()
-    assert len(np.unique(before, axis=0)) == len(before)
+    assert len(np.unique(before, axis=0)) == len(before) and not before[:, 3].any()
     images.shuffle(random)
-    assert not np.isclose(images.behind, before).any()
+    assert not np.isclose(images.behind, before)[:, :3].any()
+
+
+def test_the_mean_over_all_colours_in_closed_form(scene: Scene) -> None:
+    """A clear layer before a pixel that is half covered: the gradient of its alpha over many colours, and over all."""
+    images, random = CutOuts(scene), np.random.default_rng(0)
+    pixels = np.zeros(1, np.int32)
+    codes, finer = np.full((1, 1, 2), 30000, np.uint16), np.zeros((0, 4, 1, 2), np.uint16)
+    cut = np.array([[[100, 50, 20, 128]]], np.uint8)
+    texture = np.full((2, 2, 1, 4), 0.25, np.float32)
+    rays = codes, finer, np.full(1, -1, np.int32), pixels, pixels, np.zeros(1, np.int64), cut
+
+    def shaded() -> tuple[float, np.ndarray]:
+        gradient = np.zeros((1, 2, 2, 4), np.float32)
+        rest = texture, np.zeros((0, 3), np.float32), gradient, 0.0, 0.0, False
+        return shading_kernel.shade(*rays, images.behind[:1], *rest), gradient.sum((0, 1, 2))
+
+    found = []
+    for _ in range(4000):
+        images.shuffle(random)
+        found.append(shaded())
+    images.average()
+    squares, gradient = shaded()
+    assert squares == pytest.approx(np.mean([one for one, _ in found]), rel=0.03)
+    np.testing.assert_allclose(gradient, np.mean([of for _, of in found], 0), rtol=0.05, atol=1e-3)
+    assert gradient[3] < -0.03
 
 
 def test_without_plates_half_covered_pixels_get_the_colours_of_the_subject(scene: Scene) -> None:
@@ -95,7 +121,7 @@ def test_virtual_cameras_come_after_the_photos_and_show_the_gaussians_of_the_fra
     teacher = Teacher(scene, found(scene, 30.0), seed=0)
     real, virtual = len(scene.indices("train")), len(teacher.virtual.cameras)
     pictures = CutOuts(scene, teacher=teacher)
-    assert virtual > 0 and pictures.behind.shape == (real + virtual, 3)
+    assert virtual > 0 and pictures.behind.shape == (real + virtual, 4)
     for frame in range(scene.num_frames):
         cut = pictures.cut(frame)
         np.testing.assert_array_equal(cut[:real], CutOuts(scene).cut(frame))

@@ -109,11 +109,10 @@ def follow_frame(
     values = state.frame_colour[0, frame].numpy(), state.frame_alpha[0, frame].numpy()
     values[0][own] -= errors[own]
     cut, texture = pictures.cut(frame), _texture(state, frame)
-    random = np.random.default_rng(frame)
     params = state.params.follow
+    pictures.average()
     apart = _apart(len(views.pixel), h * w * state.params.textures.rays_per_texel)
     for step in range(params.steps):
-        pictures.shuffle(random)
         shading_kernel.shade(
             *views.arrays,
             np.arange(step % apart, len(views.pixel), apart),

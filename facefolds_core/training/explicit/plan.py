@@ -15,6 +15,9 @@ HALF_SHARE = 0.4
 """Of the iterations after the rounds of geometry, at half of the final texels a side; the others are at full
 resolution."""
 
+SETTLING = 0.6
+"""From this part of the last level on, steps are compared over all colours at once, not over one each."""
+
 ROUND_STRIDE = 8
 """At most every n-th pixel is looked at in the rounds of geometry."""
 

@@ -64,7 +64,7 @@ def shade(
     codes: Tensor,  # [R, N, 2] int32
     of: Tensor,  # [R], which of the P pixels a ray goes through
     cut: Tensor,  # [P, 4] in [0, 1], colours times opacity
-    behind: Tensor,  # [P, 3]
+    behind: Tensor,  # [P, 4]
     texture: Tensor,  # [H, W, N, 4]
     shine: Tensor,  # [P, 3]
     min_alpha: float,
@@ -76,7 +76,9 @@ def shade(
         rgba = look_up(codes, texture)
         alpha = torch.where(visible(rgba[..., 3].detach(), min_alpha, min_light), rgba[..., 3], 0.0)
         colour, transmittance = _pixels(rgba[..., :3] + shine[of][:, None], alpha, of, len(cut))
-        squares = (colour + transmittance[:, None] * behind - over(cut, behind)).square().sum()
+        mean, variance = behind[:, :3], behind[:, 3]
+        squares = (colour + transmittance[:, None] * mean - over(cut, mean)).square().sum()
+        squares = squares + (variance * (transmittance - 1 + cut[:, 3]).square()).sum()
         beside = ((1 - transmittance) * (cut[:, 3] == 0)).sum()
         (gradient,) = torch.autograd.grad(0.5 * squares + PRICE * beside, texture)
     return gradient, squares.detach()
@@ -136,7 +138,7 @@ def errors_by_texel(
     codes: Tensor,  # [R, N, 2] int32
     of: Tensor,  # [R], which of the P pixels a ray goes through
     cut: Tensor,  # [P, 4] in [0, 1], colours times opacity
-    behind: Tensor,  # [P, 3]
+    behind: Tensor,  # [P, 4]
     texture: Tensor,  # [H, W, N, 4]
     shine: Tensor,  # [P, 3]
     min_light: float,
@@ -147,7 +149,7 @@ def errors_by_texel(
         rgba = look_up(codes, texture)
         alpha = torch.where(visible(rgba[..., 3], 0.0, min_light), rgba[..., 3], 0.0).detach()
         colour, transmittance = _pixels(rgba[..., :3] + shine[of][:, None], alpha, of, len(cut))
-        error = (colour + transmittance[:, None] * behind - over(cut, behind)).detach()
+        error = (colour + transmittance[:, None] * behind[:, :3] - over(cut, behind[:, :3])).detach()
         weights, _ = compositing_weights(alpha)
         # A colour's derivative is its weight.
         (errors,) = torch.autograd.grad(

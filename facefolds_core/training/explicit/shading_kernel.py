@@ -49,7 +49,7 @@ def rgb_tap(texture, i, j, n, a, b):  # type: ignore[no-untyped-def]
 def difference(cut, behind, cam, pix, r0, r1, r2, transmittance):  # type: ignore[no-untyped-def]
     """C - I of a ray through a pixel: what its layers show, r + T g, less what is cut out, F + (1 - m) g.
 
-    cut (C, H W, 4) uint8: F and m; behind (C, 3): g."""
+    cut (C, H W, 4) uint8: F and m; behind (C, 4): g, or the mean of several."""
     inverse = np.float32(1 / 255.0)
     clear = transmittance - np.float32(255 - cut[cam, pix, 3]) * inverse
     d0 = r0 + clear * behind[cam, 0] - cut[cam, pix, 0] * inverse
@@ -67,7 +67,7 @@ def shade(  # type: ignore[no-untyped-def]
     pixel,  # (P,) int32
     rays,  # (R,) int64, which of the P to shade, none twice
     cut,  # (C, H W, 4) uint8, the subject cut out: colours F times opacity m, and m
-    behind,  # (C, 3) float32, the colour g behind it and behind the layers
+    behind,  # (C, 4) float32, of the colours g behind it and behind the layers: their mean, and v, their variances' sum
     texture,  # (H, W, N, 4) rgb and alpha in [0, 1]
     shine,  # (P, 3) float32, added to the colours that a pixel's rays meet; (0, 3) for none
     gradient,  # (N, H, W, 4), added to
@@ -76,7 +76,8 @@ def shade(  # type: ignore[no-untyped-def]
     shares,  # whether `gradient` gets w (C - I) and w in place of its gradient; w: what a texel adds to a ray's colour
 ):
     """Differentiates the sum over pixels of 0.5 |C - I|^2: I = F + (1 - m) g, and C the mean over a pixel's rays of
-    sum_i w_i c_i + T g; T is the transmittance. Where m = 0, `PRICE` (1 - T) is added.
+    sum_i w_i c_i + T g; T is the transmittance. Its mean over the colours g is that of their mean, and v (T - 1 + m)^2
+    more. Where m = 0, `PRICE` (1 - T) is added.
 
     Adds the gradient to `gradient`; returns the sum of |C - I|^2.
     """
@@ -177,7 +178,9 @@ def shade_pixel(
         light, r0, r1, r2 = light + share * t, r0 + share * a0, r1 + share * a1, r2 + share * a2
     cam, pix = camera[p], pixel[p]
     d0, d1, d2 = difference(cut, behind, cam, pix, r0, r1, r2, light)
-    price = zero if shares or cut[cam, pix, 3] > 0 else np.float32(PRICE)
+    off = light - np.float32(255 - cut[cam, pix, 3]) * np.float32(1 / 255.0)
+    price = (zero if cut[cam, pix, 3] > 0 else np.float32(PRICE)) - behind[cam, 3] * off  # of opacity
+    price = zero if shares else price
     factor = one if shares else share
     for s in range(samples):
         m, at, through = count[s], k + s, one
@@ -192,7 +195,7 @@ def shade_pixel(
             wish[n, at, 5] = w * alpha if shares else w * (d0 * g0 + d1 * g1 + d2 * g2)
             wish[n, at, 5] += factor * price * through / max(one - alpha, np.float32(CLEAREST))
             s0, s1, s2 = s0 + alpha * g0, s1 + alpha * g1, s2 + alpha * g2
-    return d0 * d0 + d1 * d1 + d2 * d2
+    return d0 * d0 + d1 * d1 + d2 * d2 + behind[cam, 3] * off * off
 
 
 @inlined

@@ -1,9 +1,15 @@
-"""What a training step is compared with: the subject alone, over a colour that changes from step to step.
+"""What a training step is compared with: the subject alone, over a colour that changes from step to step, or over all.
 
 The subject's opacity m is known in every training picture, and so its own colours F are: F = I - (1 - m) B before a
 plate B, else they are estimated (`cut_from`). Layers are compared with F + (1 - m) g over any colour g, a new one for
 each camera in each step: |C + T g - F - (1 - m) g|^2 asks for the right colour and for the right opacity at once,
 inside, at the outline and outside. What stands behind need not be known, and nothing can be painted with it.
+
+One colour a step is noise: where opacity is wrong, colours are drawn to g in turn. Early on that keeps them from
+explaining what is an error of opacity: over all colours at once from the first step on, actor with 8 cameras loses
+.3 dB over any background and .7 inside, on cameras left out. Late it stays in the textures: 8 codes of colour in
+`buddha`, whose photos are grey, and 29 % of the video's bytes in `studio`. So training ends with the mean over all
+colours.
 """
 
 from __future__ import annotations
@@ -23,11 +29,16 @@ KEPT_BYTES = 2 << 30
 """Of cut-outs that a training keeps in memory; others are made again when their frame's turn comes."""
 
 
+ALL_COLOURS = np.array([0.5, 0.5, 0.5, 3 / 12], np.float32)
+"""Mean and variance, summed over the channels, of all colours in [0, 1]."""
+
+
 class CutOuts:
     """Cut-outs of the training cameras, by frame; all their images must be there (`check_images`).
 
     Attributes:
-        behind: (C, 3) in [0, 1]: the colour behind the subject and behind the layers, of each camera.
+        behind: (C, 4): of the colours in [0, 1] behind the subject and behind the layers, of each camera, the mean and
+            the variance, summed over the channels: 0 of a single one.
         only: the one frame that is shown, whichever is asked for; None for all.
 
     Args:
@@ -52,12 +63,17 @@ class CutOuts:
         self._mattes: FrameStore = mattes
         self._kept: OrderedDict[int, NDArray[np.uint8]] = OrderedDict()
         virtual = 0 if teacher is None else len(teacher.virtual.cameras)
-        self.behind = np.full((len(self._cameras) + virtual, 3), 0.5, np.float32)
+        self.behind = np.full((len(self._cameras) + virtual, 4), 0, np.float32)
         self.only: int | None = None
+        self.average()
 
     def shuffle(self, random: np.random.Generator) -> None:
-        """Other colours behind."""
-        self.behind = random.random(self.behind.shape, np.float32)
+        """Another colour behind, of each camera."""
+        self.behind[:, :3], self.behind[:, 3] = random.random((len(self.behind), 3), np.float32), 0
+
+    def average(self) -> None:
+        """All colours behind, none more likely than another."""
+        self.behind[:] = ALL_COLOURS
 
     def cut(self, index: int) -> NDArray[np.uint8]:
         """(C, H W, 4) RGBA of a frame, colours times opacity."""

@@ -25,7 +25,7 @@ from facefolds_core.training.explicit.clearing import clear_texels
 from facefolds_core.training.explicit.fit import Fit, least_middle, recentre, volume_in
 from facefolds_core.training.explicit.follow import follow, follow_rates
 from facefolds_core.training.explicit.gloss import GlossFit
-from facefolds_core.training.explicit.plan import Level, epochs
+from facefolds_core.training.explicit.plan import SETTLING, Level, epochs
 from facefolds_core.training.explicit.rates import falling, rates_of
 from facefolds_core.training.explicit.second_surface import LAYERS, second_layers, shells_of_both
 from facefolds_core.training.explicit.state import MIN_ALPHA, TextureState, on_one_thread
@@ -195,7 +195,10 @@ class Trainer:
         for i, frame in zip(range(level.iterations), frames, strict=False):
             views, rays = self.views.part(frame, int(self.random.integers(stride)), stride)
             self.gloss.light(self.state, views, frame)
-            self.pictures.shuffle(self.random)
+            if level.last and i >= SETTLING * level.iterations:
+                self.pictures.average()
+            else:
+                self.pictures.shuffle(self.random)
             rates = self._rates(level.pace, i / level.iterations if level.last else 0.0)
             error = self.state.step(views, rays, self.pictures, frame, min_alpha, rates)
             if not coarse and level.smooths(i, self.params.textures.smooth_every):

@@ -91,12 +91,12 @@ class FrameFitter:
         phases: list[int] = []
         rays, errors = 0, []
         pictures, self.pictures.only = self.pictures, frame
+        pictures.average()
         for i in range(steps):
             phases = phases or random.permutation(parts).tolist()
             seen, which = views.part(0, phases.pop(), parts)
             if self.maps is not None and self.scene.poses is not None:
                 state.shine = self.maps.on_rays(seen, self.scene.poses.at(frame).rotation)
-            pictures.shuffle(random)
             errors.append(state.step(seen, which, pictures, 0, MIN_ALPHA, self._rates(i / steps)))
             if i % params.textures.smooth_every == 0:
                 state.smooth_frame(0)
