@@ -26,7 +26,7 @@ from facefolds_core.subject.fit import fit_pictures
 from facefolds_core.subject.foreign import read_start
 from facefolds_core.subject.found import joined, reference_frame
 from facefolds_core.subject.gaussians import GaussianParams
-from facefolds_core.subject.mattes import Image, Key, Mattes, body_among
+from facefolds_core.subject.mattes import Image, Key, Mattes, Source, body_among
 from facefolds_core.subject.splats import Splats
 from facefolds_core.subject.storage import BODY, Body, FoundSubject, read_body, read_found, write_found
 
@@ -47,12 +47,14 @@ class View:
         key: of the picture.
         colours: (H, W, 3) times opacity.
         opacity: (H, W).
+        source: whence that is.
     """
 
     camera: int
     key: Key
     colours: Array
     opacity: Array
+    source: Source
 
 
 def frames_looked_at(scene: Scene) -> list[int]:
@@ -71,7 +73,8 @@ def find_subject(
 
     Where the mattes of the pictures looked at are known, Gaussians are fitted to the subject cut out of them. Else
     they are fitted to whole pictures of one frame first, told apart from the room, and then trained on with the subject
-    cut out.
+    cut out. Where a picture contradicted the first fit, they are trained on once more, with its matte asked anew: room
+    that hung before the subject has left a hole in it.
 
     Args:
         named: mattes that the user has corrected.
@@ -89,16 +92,23 @@ def find_subject(
     if not any((view.opacity > 0.5).any() for view in views):
         raise _nothing(scene)
     if start is None:
-        cameras, given = [scene.camera_in_head(*view.key) for view in views], [view.opacity for view in views]
-        colours = [view.colours for view in views]
-        splats = fit_pictures(cameras, colours, how, params.seed, given, begun)
+        splats = mattes.alone = _fit_alone(scene, views, how, params.seed, begun)
+        if any(view.source == "gaussians" for view in views):
+            views = [view_cut_out(scene, mattes, key) for key in keys]
+            splats = _fit_alone(scene, views, how, params.seed, splats)
     else:
         assert begun is not None
-        splats = begun
-    splats = splats.part(joined(splats, scene))
+        splats = begun.part(joined(begun, scene))
     mattes.alone = splats
     fit, psnr = judged(scene, splats, views)
     return FoundSubject(splats, psnr, fit), mattes
+
+
+def _fit_alone(scene: Scene, views: Sequence[View], how: GaussianParams, seed: int, begun: Splats | None) -> Splats:
+    """Gaussians of the subject cut out of pictures, what floats apart left out."""
+    cameras, opacities = [scene.camera_in_head(*view.key) for view in views], [view.opacity for view in views]
+    splats = fit_pictures(cameras, [view.colours for view in views], how, seed, opacities, begun)
+    return splats.part(joined(splats, scene))
 
 
 def fit_room(scene: Scene, frame: int, params: GaussianParams | None = None, seed: int = 0) -> Splats:
@@ -124,13 +134,14 @@ def gaussian_params(params: SubjectParams, scene: Scene) -> GaussianParams:
 
 def view_cut_out(scene: Scene, mattes: Mattes, key: Key) -> View:
     """A training picture with the subject cut out of it."""
-    opacity = mattes.of(key).opacity.astype(np.float32) / np.float32(255)
+    matte = mattes.of(key)
+    opacity = matte.opacity.astype(np.float32) / np.float32(255)
     picture = scene.open_frames().image(*key).astype(np.float32) / np.float32(255)
     plates, plate = scene.open_plates(), None
     if plates is not None and (key[0], 0) in plates:
         plate = plates.image(key[0], 0).astype(np.float32) / np.float32(255)
     colours = np.asarray(cut_from(picture, opacity, plate), np.float32)
-    return View(scene.indices("train").index(key[0]), key, colours, opacity)
+    return View(scene.indices("train").index(key[0]), key, colours, opacity, matte.source)
 
 
 def judged(scene: Scene, splats: Splats, views: Sequence[View]) -> tuple[CameraFit, float]:

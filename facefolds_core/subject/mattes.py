@@ -80,7 +80,7 @@ class Mattes:
         self.alone: Splats | None = None
         self._frames, self._plates, self._given = scene.open_frames(), scene.open_plates(), scene.open_mattes()
         self._drawn: tuple[Key, tuple[Array, Array]] | None = None
-        self._drawn_alone: tuple[Key, Array] | None = None
+        self._drawn_alone: tuple[Splats, Key, Array] | None = None
 
     def known(self, key: Key) -> bool:
         """Whether it needs no Gaussians."""
@@ -126,11 +126,11 @@ class Mattes:
     def _alone_in(self, key: Key) -> Array:
         """(H, W) opacity of the Gaussians that were trained with the subject cut out."""
         assert self.alone is not None
-        same = self._view(key)
-        if self._drawn_alone is None or self._drawn_alone[0] != same:
+        known, same = self._drawn_alone, self._view(key)
+        if known is None or known[0] is not self.alone or known[1] != same:
             seen = draw(self.alone.values, view_of(self.scene.camera_in_head(*key))).picture()
-            self._drawn_alone = same, np.asarray(1 - seen[1])
-        return self._drawn_alone[1]
+            known = self._drawn_alone = self.alone, same, np.asarray(1 - seen[1])
+        return known[2]
 
     def _view(self, key: Key) -> Key:
         """Which pictures show the subject from the same place: all of a camera, but of a head that turns."""

@@ -6,6 +6,7 @@ import json
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -18,7 +19,9 @@ from facefolds_core.files.frame_store import write_frames
 from facefolds_core.files.paths import SubjectFolders
 from facefolds_core.geometry.track import Track
 from facefolds_core.params import SubjectParams
+from facefolds_core.subject import find
 from facefolds_core.subject.find import all_mattes, find_subject, found_in, frames_looked_at, subject_in
+from facefolds_core.subject.fit import fit_pictures
 from facefolds_core.subject.folder import make_folder
 from facefolds_core.subject.found import DOUBT, belief, joined, subject_of
 from facefolds_core.subject.mattes import Matte, Mattes
@@ -26,7 +29,7 @@ from facefolds_core.subject.ply import write_ply
 from facefolds_core.subject.sheet import RED, tile
 from facefolds_core.subject.splats import MEAN, OPACITY, SCALE, Splats
 from facefolds_core.subject.storage import BODY, Body, read_found, write_body, write_found
-from tests.scenes import OPAQUE, gaussians, make_scene, render
+from tests.scenes import CENTRE, OPAQUE, gaussians, make_scene, render
 
 SIZE = 24
 PARAMS = SubjectParams(iterations=60, fewest=300, most=300)
@@ -185,6 +188,29 @@ def test_gaussians_that_poses_were_found_with_are_taken_up(tmp_path: Path) -> No
     write_body(tmp_path / BODY, Body(splats, inside[1:], 1))
     with pytest.raises(UserError, match="Gaussians are damaged"):
         find_subject(scene, PARAMS)
+
+
+def test_where_room_hung_before_the_subject_it_is_fitted_again_without(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scene, head = make_scene(tmp_path, size=SIZE), gaussians(OPAQUE, 1000)
+    curtain = head.values[:1].copy()
+    curtain[:, MEAN] = CENTRE + 0.62 * (scene.cameras[scene.indices("train")[0]].centre - CENTRE)
+    curtain[:, SCALE], curtain[:, OPACITY] = np.log(0.07), 9
+    both = Splats(np.concatenate([head.values, curtain]), head.background)
+    write_body(tmp_path / BODY, Body(both, np.arange(len(both)) < len(head), 1))
+    fits: list[list[np.ndarray]] = []
+
+    def recorded(*args: Any) -> Splats:
+        fits.append(args[4])
+        return fit_pictures(*args)
+
+    monkeypatch.setattr(find, "fit_pictures", recorded)
+    find_subject(scene, PARAMS.model_copy(update={"iterations": 120}))
+    first, again = fits
+    assert first[0].mean() < 0.9 * again[0].mean()
+    for one, other in zip(first[1:], again[1:], strict=True):
+        np.testing.assert_array_equal(one, other)
 
 
 def test_a_splat_file_takes_the_place_of_our_own_fit(tmp_path: Path) -> None:
