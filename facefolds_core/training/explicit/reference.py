@@ -64,7 +64,7 @@ def shade(
     codes: Tensor,  # [R, N, 2] int32
     of: Tensor,  # [R], which of the P pixels a ray goes through
     cut: Tensor,  # [P, 4] in [0, 1], colours times opacity
-    behind: Tensor,  # [P, 4]
+    behind: Tensor,  # [P, 4], of the colours behind the mean, and their variances' sum
     texture: Tensor,  # [H, W, N, 4]
     shine: Tensor,  # [P, 3]
     min_alpha: float,
@@ -138,7 +138,7 @@ def errors_by_texel(
     codes: Tensor,  # [R, N, 2] int32
     of: Tensor,  # [R], which of the P pixels a ray goes through
     cut: Tensor,  # [P, 4] in [0, 1], colours times opacity
-    behind: Tensor,  # [P, 4]
+    behind: Tensor,  # [P, 4], of the colours behind the mean, and their variances' sum
     texture: Tensor,  # [H, W, N, 4]
     shine: Tensor,  # [P, 3]
     min_light: float,

@@ -8,7 +8,7 @@ inside, at the outline and outside. What stands behind need not be known, and no
 One colour a step is noise: where opacity is wrong, colours are drawn to g in turn. Early on that keeps them from
 explaining what is an error of opacity: over all colours at once from the first step on, actor with 8 cameras loses
 .3 dB over any background and .7 inside, on cameras left out. Late it stays in the textures: 8 codes of colour in
-`buddha`, whose photos are grey, and 29 % of the video's bytes in `studio`. So training ends with the mean over all
+`buddha`, whose photos are grey, and 26 % of the video's bytes in `studio`. So training ends with the mean over all
 colours.
 """
 
@@ -63,7 +63,7 @@ class CutOuts:
         self._mattes: FrameStore = mattes
         self._kept: OrderedDict[int, NDArray[np.uint8]] = OrderedDict()
         virtual = 0 if teacher is None else len(teacher.virtual.cameras)
-        self.behind = np.full((len(self._cameras) + virtual, 4), 0, np.float32)
+        self.behind = np.empty((len(self._cameras) + virtual, 4), np.float32)
         self.only: int | None = None
         self.average()
 

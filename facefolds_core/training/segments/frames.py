@@ -91,7 +91,6 @@ class FrameFitter:
         phases: list[int] = []
         rays, errors = 0, []
         pictures, self.pictures.only = self.pictures, frame
-        pictures.average()
         for i in range(steps):
             phases = phases or random.permutation(parts).tolist()
             seen, which = views.part(0, phases.pop(), parts)
