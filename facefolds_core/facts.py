@@ -81,7 +81,7 @@ WORDS = {
     "{under:g}): look at subject/sheet.png, and check the calibration (docs/guide/subjects.md)",
     "surface_without_a_place": "warning: {share:.0%} of the visible surface have no place in the chart around "
     "x = {x:.2f}: it will be missing or torn; add candidates to train.start.centres or train.start.belts",
-    "codec_misses": "warning: the video reaches {reached:.1f} dB of the {target:g} of compress.video.target_psnr: "
+    "codec_misses": "warning: the video reaches {reached:.1f} dB of the {target:.1f} it was asked for: "
     "finer quantisation gives no more; finer textures (texture.resolution) do",
     "stands_still": "warning: the asset shows {asset:.0%} of what changes from frame to frame, the model {model:.0%} "
     "(under {under:.0%}): its film stands still where the subject moves. If both are low, train longer "

@@ -43,7 +43,7 @@ def compress(folders: SubjectFolders) -> str:
     mesh_bytes = sum(layer.bytes for layer in level.layers)
     videos = ", ".join(f"{video.codec} level {video.level}, {video.bytes} bytes" for video in level.texture.videos)
     quality = f", {level.quality.psnr_to_model:.1f} dB to what went in" if level.quality else ""
-    warning = codec_warning(level.quality.psnr_to_model if level.quality else None, params.video)
+    warning = codec_warning(level.quality)
     if warning:
         sys.stderr.write(f"compress: {warning}\n")
     coarser = "".join(f"; {other.name} {other.bytes} bytes" for other in manifest.levels[:-1])

@@ -14,7 +14,7 @@ from facefolds_core.files.writing import atomic_folder, write_json
 from facefolds_core.model import load_model
 from facefolds_core.model.device import device_of
 from facefolds_core.packaging.notes import codec_warning
-from facefolds_core.params import CompressParams, EvaluateParams
+from facefolds_core.params import EvaluateParams
 from facefolds_core.scoring.evaluation import Evaluation
 from facefolds_core.scoring.evaluation import evaluate as score
 from facefolds_core.scoring.films import FILMS
@@ -29,9 +29,7 @@ from facefolds_core.scoring.warnings import matte_is_found, stands_still, traini
 
 def noticed(folders: SubjectFolders, scene: Scene, asset: Asset, result: Evaluation) -> tuple[Fact, ...]:
     """What is not well with the capture, the training, the files and the scores."""
-    video = read_stage(CompressParams, folders.config)
-    quality = asset.manifest.full.quality
-    codec = codec_warning(quality.psnr_to_model if quality else None, video.video)
+    codec = codec_warning(asset.manifest.full.quality)
     limits = read_stage(EvaluateParams, folders.config).warnings
     return warnings_among(
         [

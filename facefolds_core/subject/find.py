@@ -26,7 +26,7 @@ from facefolds_core.subject.fit import fit_pictures
 from facefolds_core.subject.foreign import read_start
 from facefolds_core.subject.found import joined, reference_frame
 from facefolds_core.subject.gaussians import GaussianParams
-from facefolds_core.subject.mattes import Image, Key, Mattes, Source, body_among
+from facefolds_core.subject.mattes import Image, Key, Mattes, body_among
 from facefolds_core.subject.splats import Splats
 from facefolds_core.subject.storage import BODY, Body, FoundSubject, read_body, read_found, write_found
 
@@ -47,14 +47,12 @@ class View:
         key: of the picture.
         colours: (H, W, 3) times opacity.
         opacity: (H, W).
-        source: whence that is.
     """
 
     camera: int
     key: Key
     colours: Array
     opacity: Array
-    source: Source
 
 
 def frames_looked_at(scene: Scene) -> list[int]:
@@ -73,8 +71,8 @@ def find_subject(
 
     Where the mattes of the pictures looked at are known, Gaussians are fitted to the subject cut out of them. Else
     they are fitted to whole pictures of one frame first, told apart from the room, and then trained on with the subject
-    cut out. Where a picture contradicted the first fit, they are trained on once more, with its matte asked anew: room
-    that hung before the subject has left a hole in it.
+    cut out. Then they are trained on once more, with mattes that know them: a picture that contradicted the first fit
+    was cut out with room hanging before the subject, which left a hole in it.
 
     Args:
         named: mattes that the user has corrected.
@@ -92,10 +90,9 @@ def find_subject(
     if not any((view.opacity > 0.5).any() for view in views):
         raise _nothing(scene)
     if start is None:
-        splats = mattes.alone = _fit_alone(scene, views, how, params.seed, begun)
-        if any(view.source == "gaussians" for view in views):
-            views = [view_cut_out(scene, mattes, key) for key in keys]
-            splats = _fit_alone(scene, views, how, params.seed, splats)
+        mattes.alone = _fit_alone(scene, views, how, params.seed, begun)
+        views = [view_cut_out(scene, mattes, key) for key in keys]
+        splats = _fit_alone(scene, views, how, params.seed, mattes.alone)
     else:
         assert begun is not None
         splats = begun.part(joined(begun, scene))
@@ -141,7 +138,7 @@ def view_cut_out(scene: Scene, mattes: Mattes, key: Key) -> View:
     if plates is not None and (key[0], 0) in plates:
         plate = plates.image(key[0], 0).astype(np.float32) / np.float32(255)
     colours = np.asarray(cut_from(picture, opacity, plate), np.float32)
-    return View(scene.indices("train").index(key[0]), key, colours, opacity, matte.source)
+    return View(scene.indices("train").index(key[0]), key, colours, opacity)
 
 
 def judged(scene: Scene, splats: Splats, views: Sequence[View]) -> tuple[CameraFit, float]:
