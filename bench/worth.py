@@ -86,12 +86,8 @@ MECHANISMS: dict[str, Off] = {
     "opacity goes back to the Gaussians'": Off(code={f"{TRAINING}.state:BELIEF": 0.0}),
     "opacity is smoothed": Off({"textures": {"smooth_every": NEVER}}),
     "four rays at outlines": Off(code={f"{TRAINING}.views:SOFT": 256}),
-    "frames' parts decay": Off({"textures": {"frame_decay": 1.0}}),
     "what moves is followed": Off(code={f"{TRAINING}.trainer:Trainer._follow": _nothing}),
     "reflection": Off({"reflection": {"enabled": False}}),
-    "texels beside the subject go": Off(code={f"{TRAINING}.clearing:BESIDE_OPACITY": -1.0}),
-    "texels that no ray shows go": Off({"pruning": {"texel_opacity": 0.0}}),
-    "specks go": Off({"pruning": {"speck_share": 0.0}}),
 }
 """What can be switched off: name -> how. Prices in compiled kernels and what the stage `subject` does are not here."""
 

@@ -66,10 +66,6 @@ WORDS = {
     "mesh_is_off": "the tracked mesh is left out: in {share:.0%} of the directions it lies over {distance} units "
     "from what the images show (is its scale or its place wrong?)",
     "followed": "frames moved once more, where they did not follow what moves: {share:.1%} of the texels each",
-    "specks_cleared": "{count} patches of texels beside the subject made transparent, each under {share:.0%} of it "
-    "(train.pruning.speck_share)",
-    "texels_cleared": "{share:.0%} of all texels cleared: they add less than {least:.5f} to any ray, "
-    "or lie beside the subject",
     "layer_dropped": "layer {layer} dropped: alpha at most {alpha:.4f}",
     "reflection": "a reflection shared by layers and frames gains {gain:.2f} dB on cameras that its fit did not see",
     "smooth_reflection": "a reflection shared by layers and frames gains {gain:.2f} dB on cameras that its fit did not "

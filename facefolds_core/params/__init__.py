@@ -32,7 +32,6 @@ from facefolds_core.params.export import (
 )
 from facefolds_core.params.gaussians import SubjectParams
 from facefolds_core.params.mlp import MlpParams
-from facefolds_core.params.pruning import PruningParams
 from facefolds_core.params.reflection import ReflectionParams
 from facefolds_core.params.sections import SECTIONS, STAGE_SECTIONS, section_of, train_params, user_error
 from facefolds_core.params.segments import SegmentParams
@@ -65,7 +64,6 @@ __all__ = [
     "NormalizeParams",
     "Overrides",
     "Preset",
-    "PruningParams",
     "ReconstructParams",
     "ReflectionParams",
     "SampleParams",

@@ -7,7 +7,6 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from facefolds_core.params.base import Count, Factor, Rate, Section, Seed, Share
-from facefolds_core.params.pruning import PruningParams
 from facefolds_core.params.reflection import ReflectionParams
 from facefolds_core.params.segments import SegmentParams
 from facefolds_core.params.surfaces import GeometryParams, StartParams
@@ -27,13 +26,9 @@ class GridTextureParams(Section):
     """Of the colours shared by layers and frames; it falls along the last level. The other rates are factors on it."""
 
     full_rate_iterations: Count = 460
-    """Of more `iterations` than these, the steps at half and full resolution are smaller in proportion, and decay
-    and smoothing with them: they go the same way more finely. At full rate four times as many lost 0.3 dB
+    """Of more `iterations` than these, the steps at half and full resolution are smaller in proportion, and smoothing
+    is rarer: they go the same way more finely. At full rate four times as many lost 0.3 dB
     on cameras left out (`mugsy`, `studio`), since layers begin to show each camera its own picture."""
-
-    frame_decay: Annotated[float, Field(gt=0, le=1)] = 0.999
-    """The frames' parts shrink by this factor each step towards what is shared: what every frame shows belongs
-    there."""
 
     steps_per_frame: Count = 20
     """Of the iterations after the rounds of geometry there are at least so many a frame of the capture: two fifths of
@@ -111,9 +106,6 @@ class ExplicitParams(Section):
 
     segments: SegmentParams = SegmentParams()
     """Of takes that are too long to be trained at once."""
-
-    pruning: PruningParams = PruningParams()
-    """What is left out in the end."""
 
     @property
     def least_iterations(self) -> int:

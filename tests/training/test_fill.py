@@ -8,13 +8,13 @@ import numpy as np
 import torch
 
 from facefolds_core.params import ExplicitParams
-from facefolds_core.training.explicit.state import BELIEF, MAX_OPACITY, MIN_OPACITY, TextureState
+from facefolds_core.training.explicit.state import BELIEF, FAINT, MAX_OPACITY, MIN_OPACITY, TextureState
 from facefolds_core.training.explicit.views import Views
 
 
 def test_layers_begin_with_what_is_given_and_keep_what_they_have_learnt() -> None:
     rng = np.random.default_rng(0)
-    start = torch.tensor([0.3, 0.4, 0.5, 1.0]).expand(2, 2, 4)
+    start = torch.tensor([0.3, 0.4, 0.5]).expand(2, 2, 3)
     state = TextureState((4, 6), 3, 2, start, ExplicitParams())
     opacity, rgb = rng.uniform(0.1, 0.9, (24, 3)).astype(np.float32), rng.random((24, 3, 3), np.float32)
     opacity[0], opacity[1] = 0, 1
@@ -33,7 +33,7 @@ def test_layers_begin_with_what_is_given_and_keep_what_they_have_learnt() -> Non
 
 
 def test_a_frame_begins_with_an_opacity_of_its_own() -> None:
-    state = TextureState((4, 6), 3, 2, torch.full((2, 2, 4), 0.5), ExplicitParams())
+    state = TextureState((4, 6), 3, 2, torch.full((2, 2, 3), 0.5), ExplicitParams())
     usual, own = np.random.default_rng(0).uniform(0.1, 0.9, (2, 24, 3)).astype(np.float32)
     state.fill(usual)
     state.fill_frame(1, own)
@@ -45,7 +45,7 @@ def test_a_frame_begins_with_an_opacity_of_its_own() -> None:
 
 def test_steps_draw_opacity_back_to_what_is_believed() -> None:
     """A step on rays that meet nothing changes logits by this alone: of the difference 1 - BELIEF is left."""
-    state = TextureState((4, 6), 3, 2, torch.full((2, 2, 4), 0.5), ExplicitParams())
+    state = TextureState((4, 6), 3, 2, torch.full((2, 2, 3), 0.5), ExplicitParams())
     state.fill(np.full((24, 3), 0.5, np.float32))
     numbers = np.zeros(2, np.int32)
     views = Views.centred(np.zeros((2, 3, 2), np.uint16), numbers, numbers, np.zeros((2, 3), np.float32))
@@ -56,6 +56,20 @@ def test_steps_draw_opacity_back_to_what_is_believed() -> None:
     step()
     torch.testing.assert_close(state.layers[0, ..., 3], torch.full((24, 3), BELIEF * float(np.log(9))))
     assert not state.frame_alpha.any()
+
+
+def test_what_stays_fainter_than_a_code_in_all_frames_goes() -> None:
+    """Texels that no ray has met are as opaque as layers begin: a veil, layer by layer."""
+    state = TextureState((1, 4), 1, 3, torch.full((2, 2, 3), 0.5), ExplicitParams())
+    usual = np.array([[MIN_OPACITY], [0.9 * FAINT], [1.1 * FAINT], [0.5]], np.float32)
+    shown = usual.copy()
+    shown[1] = 0.3  # in one frame
+    state.fill(usual)
+    state.fill_frame(2, shown)
+    state.drop_faint()
+    shown[0] = usual[0] = 0
+    for frame, opacity in enumerate((usual, usual, shown)):
+        np.testing.assert_allclose(state.activated(frame)[..., 3].numpy(), opacity, atol=2e-4)
 
 
 class OneColour:

@@ -109,7 +109,7 @@ class Film:
         self.behind[:] = ALL_COLOURS
 
     def state(self) -> TextureState:
-        start = torch.tensor([*self.usual, 0.5], dtype=torch.float32).expand(2, 2, 4)
+        start = torch.tensor(self.usual, dtype=torch.float32).expand(2, 2, 3)
         state = TextureState(self.shape, 1, self.frames, start, PARAMS)
         state.layers[0, ..., 3] = 9
         return state
@@ -220,7 +220,7 @@ def test_what_is_seen_against_nothing_stays_transparent() -> None:
     opaque = np.full((film.rays, 1), 255)
     opaque[alone] = 0
     film.cut = lambda index: np.concatenate([film.images[index], opaque], -1).astype(np.uint8)[None]  # type: ignore[method-assign]
-    start = torch.tensor([*film.usual, 0.5], dtype=torch.float32).expand(2, 2, 4)
+    start = torch.tensor(film.usual, dtype=torch.float32).expand(2, 2, 3)
     state = TextureState(film.shape, 2, film.frames, start, PARAMS)
     state.layers[0, ..., 3] = torch.tensor([-3.0, 9.0])
     _, share = follow(state, film.source, film, RATES, unlit)

@@ -74,7 +74,7 @@ class Noise:
 def test_the_rays_of_a_fit_are_every_so_many_th_of_all_frames_together(scene: Scene) -> None:
     turns = Track.of([about((0, 0, 1), 5.0 * k) for k in range(6)], np.zeros((6, 3)))
     source = rays(replace(scene, frame_ids=tuple("abcdef"), poses=turns), share=150)
-    state = TextureState((8, 8), 3, 6, torch.full((2, 2, 4), 0.5), params())
+    state = TextureState((8, 8), 3, 6, torch.full((2, 2, 3), 0.5), params())
     state.layers[0] = 4 * torch.randn(state.layers[0].shape, generator=torch.Generator().manual_seed(0))
     window = (-0.6, 0.6, -0.6, 0.6)
     every, some = (
@@ -93,7 +93,7 @@ def test_steps_are_lit_as_the_head_stands_in_their_frame(scene: Scene) -> None:
     """In each frame another picture of the room, that of the model at the layer in the middle."""
     turns = Track.of([about((0, 0, 1), 20.0 * k) for k in range(2)], np.zeros((2, 3)))
     source = rays(replace(scene, frame_ids=tuple("ab"), poses=turns), share=150)
-    state = TextureState((8, 8), 3, 2, torch.full((2, 2, 4), 0.5), params())
+    state = TextureState((8, 8), 3, 2, torch.full((2, 2, 3), 0.5), params())
     window, rng = (-0.6, 0.6, -0.6, 0.6), np.random.default_rng(0)
     given = ReflectionParams(texels=6, environment_texels=5)
     gloss = GlossFit(layers().chart, window, given, turns)
@@ -126,7 +126,7 @@ def test_rays_that_are_clear_reflect_in_the_middle(scene: Scene) -> None:
 
 def test_nothing_is_fitted_before_anything_is_opaque(scene: Scene) -> None:
     """No gloss would be found then, and without gloss no light ever after."""
-    state = TextureState((8, 8), 3, 6, torch.full((2, 2, 4), 0.5), params())
+    state = TextureState((8, 8), 3, 6, torch.full((2, 2, 3), 0.5), params())
     source = StillRays(trace_views(scene, layers(), 1))
     gloss = GlossFit(layers().chart, layers().window, ReflectionParams(texels=4, environment_texels=4), None)
     gloss.follow(state, source, Noise(), layers().middle.detach())

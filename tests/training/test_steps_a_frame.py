@@ -8,11 +8,9 @@ from itertools import islice
 
 import numpy as np
 import pytest
-import torch
 
 from facefolds_core.params import ExplicitParams
 from facefolds_core.training.explicit.plan import epochs, plan
-from facefolds_core.training.explicit.state import TextureState
 from tests.training.test_warnings import WELL
 
 PIXELS = 3_000_000
@@ -66,13 +64,6 @@ def test_opacity_is_smoothed_as_often_in_a_longer_training(parts: int) -> None:
     level = replace(plan(FITTED, params(), 1, PIXELS)[-1], pace=1 / parts)
     smoothed = [i for i in range(168 * parts) if level.smooths(i, 3)]
     assert smoothed == [3 * parts * k for k in range(56)]
-
-
-def test_frames_decay_at_the_level_s_pace() -> None:
-    state = TextureState((4, 4), 2, 1, torch.zeros(2, 2, 4), params())
-    assert state.kept_of_frames == np.float32(0.999)
-    state.pace = 0.25
-    assert state.kept_of_frames == pytest.approx(0.999**0.25)
 
 
 @pytest.mark.parametrize(("pixels", "stride"), [(3_000_000, 8), (2_000_000, 8), (1_440_000, 5), (540_672, 2), (100, 1)])

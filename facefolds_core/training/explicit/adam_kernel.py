@@ -30,9 +30,9 @@ def activate_texel(k: Any, colour: Any, layers: Any, frame_colour: Any, frame_al
 
 
 @inlined
-def _adam(values, first, second, index, g, rate, correct1, correct2, keep, decay):  # type: ignore[no-untyped-def]
-    """One Adam step on values[index], then shrinking by `keep`."""
-    values[index] = (values[index] - adam(first, second, index, g, rate, correct1, correct2, decay)) * keep
+def _adam(values, first, second, index, g, rate, correct1, correct2, decay):  # type: ignore[no-untyped-def]
+    """One Adam step on values[index]."""
+    values[index] -= adam(first, second, index, g, rate, correct1, correct2, decay)
 
 
 @kernel(parallel=True)
@@ -44,7 +44,6 @@ def adam_step(  # type: ignore[no-untyped-def]
     texture,  # (M, N, 4) as activated
     gradient,  # (N, M, 4) with respect to `texture`; zero afterwards
     rates,  # (5,) of colour, layer colour, alpha, frame colour, frame alpha
-    keep,  # factor by which the frames' parts shrink each step
     correct,  # (4,) bias corrections of both moments, of the static and of this frame's parts
     decay,  # (4,) of `adam.decays`
 ):
@@ -56,12 +55,12 @@ def adam_step(  # type: ignore[no-untyped-def]
     for k in prange(layers.shape[1]):
         static = (colour0, colour1, colour2), (layers0, layers1, layers2)
         own = (frame0, frame1, frame2), (fade0, fade1, fade2)
-        adam_texel(k, static, own, texture, gradient, rates, keep, correct, decay)
+        adam_texel(k, static, own, texture, gradient, rates, correct, decay)
 
 
 @inlined  # a call with so many arrays costs
 def adam_texel(
-    k: Any, static: Any, own: Any, texture: Any, gradient: Any, rates: Any, keep: Any, correct: Any, decay: Any
+    k: Any, static: Any, own: Any, texture: Any, gradient: Any, rates: Any, correct: Any, decay: Any
 ) -> None:
     """`adam_step` of texel k; static and own are values and moments of its first four arguments."""
     (colour0, colour1, colour2), (layers0, layers1, layers2) = static
@@ -84,16 +83,16 @@ def adam_texel(
         sum2 += g2
         for q in range(3):
             g = g0 if q == 0 else (g1 if q == 1 else g2)
-            _adam(layers0, layers1, layers2, (k, n, q), g, rates[1], correct[0], correct[1], one, decay)
+            _adam(layers0, layers1, layers2, (k, n, q), g, rates[1], correct[0], correct[1], decay)
         alpha = texture[k, n, 3]
         g = g3 * alpha * (1 - alpha)
-        _adam(layers0, layers1, layers2, (k, n, 3), g, rates[2], correct[0], correct[1], one, decay)
+        _adam(layers0, layers1, layers2, (k, n, 3), g, rates[2], correct[0], correct[1], decay)
         layers0[k, n, 3] = min(max(layers0[k, n, 3], np.float32(-9.0)), np.float32(9.0))
-        _adam(fade0, fade1, fade2, (k, n), g, rates[4], correct[2], correct[3], keep, decay)
+        _adam(fade0, fade1, fade2, (k, n), g, rates[4], correct[2], correct[3], decay)
     if not met:
         return
     for q in range(3):
         g = sum0 if q == 0 else (sum1 if q == 1 else sum2)
-        _adam(colour0, colour1, colour2, (k, q), g, rates[0], correct[0], correct[1], one, decay)
+        _adam(colour0, colour1, colour2, (k, q), g, rates[0], correct[0], correct[1], decay)
         colour0[k, q] = min(max(colour0[k, q], np.float32(0.0)), one)
-        _adam(frame0, frame1, frame2, (k, q), g, rates[3], correct[2], correct[3], keep, decay)
+        _adam(frame0, frame1, frame2, (k, q), g, rates[3], correct[2], correct[3], decay)

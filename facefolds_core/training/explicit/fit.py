@@ -72,7 +72,7 @@ class Fit:
         reach: half of how far it moves beyond that over the frames, units; added to any multiple of the halfwidth.
         second: middle radii of a second surface beneath the first, units; 0 where there is none.
         trust: offsets of the layers from the start are shrunk by this much towards 0, units.
-        opacity, rgb: of the start, (rows, columns) and (rows, columns, 3).
+        rgb: of the start, (rows, columns, 3).
         texels: (H, W) of the finest textures.
         reasons: one a choice, and the notes.
         notes: what a user should know at once.
@@ -88,7 +88,6 @@ class Fit:
     reach: Array
     second: Array
     trust: Array
-    opacity: Array
     rgb: Array
     texels: tuple[int, int]
     reasons: tuple[Fact, ...]
@@ -147,7 +146,6 @@ def fit_scene(scene: Scene, subject: FoundSubject, params: ExplicitParams, other
         reach=reach,
         second=second,
         trust=TRUST * kept + reach,
-        opacity=opacity,
         rgb=seen.rgb.astype(np.float64),
         texels=texels,
         reasons=(*_reasons(params, losses[chart], source, most, second), *notes),

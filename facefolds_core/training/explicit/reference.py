@@ -41,25 +41,6 @@ def visible(alpha: Tensor, min_alpha: float, min_light: float) -> Tensor:
     return (alpha >= min_alpha) & (before >= min_light)
 
 
-def contributions(codes: Tensor, texture: Tensor, min_light: float) -> Tensor:
-    """As `shading_kernel.contributions`: [R, N, 2] int32, [H, W, N, 4] -> [N, H, W]."""
-    height, width, layers, _ = texture.shape
-    x = ((codes[..., 0] - 1) * (width / SCALE) - 0.5).clamp(0, width - 1)
-    y = ((codes[..., 1] - 1) * (height / SCALE) - 0.5).clamp(0, height - 1)
-    j, i = x.floor().clamp(max=width - 2).long(), y.floor().clamp(max=height - 2).long()
-    alpha = look_up(codes, texture)[..., 3]
-    before, _ = transmittances(alpha)
-    n = torch.arange(layers, device=texture.device).expand_as(i)
-    hit = (codes[..., 0] > 0) & visible(alpha, 0.0, min_light)
-    peak = texture.new_zeros(height * width * layers)
-    for di, wi in ((0, 1 - (y - i)), (1, y - i)):
-        for dj, wj in ((0, 1 - (x - j)), (1, x - j)):
-            index = (n * height + i + di) * width + j + dj
-            share = before * wi * wj * texture[i + di, j + dj, n, 3]
-            peak.scatter_reduce_(0, index[hit], share[hit], "amax")
-    return peak.view(layers, height, width)
-
-
 def shade(
     codes: Tensor,  # [R, N, 2] int32
     of: Tensor,  # [R], which of the P pixels a ray goes through
@@ -106,7 +87,6 @@ def adam_step(
     texture: Tensor,  # [M, N, 4]
     gradient: Tensor,  # [M, N, 4]
     rates: Tensor,  # [5]
-    keep: float,
     correct: Tensor,  # [4]
     betas: Betas,
 ) -> None:
@@ -114,22 +94,22 @@ def adam_step(
     met = (gradient != 0).any(-1)
     alpha = texture[..., 3]
     slope = gradient[..., 3] * alpha * (1 - alpha)
-    _adam(layers[..., :3], gradient[..., :3], met[..., None], rates[1], correct[:2], 1.0, betas)
-    _adam(layers[..., 3], slope, met, rates[2], correct[:2], 1.0, betas)
+    _adam(layers[..., :3], gradient[..., :3], met[..., None], rates[1], correct[:2], betas)
+    _adam(layers[..., 3], slope, met, rates[2], correct[:2], betas)
     layers[0, ..., 3].clamp_(-9, 9)
-    _adam(frame_alpha, slope, met, rates[4], correct[2:], keep, betas)
+    _adam(frame_alpha, slope, met, rates[4], correct[2:], betas)
     total, any_met = gradient[..., :3].sum(1), met.any(1, keepdim=True)
-    _adam(colour, total, any_met, rates[0], correct[:2], 1.0, betas)
+    _adam(colour, total, any_met, rates[0], correct[:2], betas)
     colour[0].clamp_(0, 1)
-    _adam(frame_colour, total, any_met, rates[3], correct[2:], keep, betas)
+    _adam(frame_colour, total, any_met, rates[3], correct[2:], betas)
 
 
-def _adam(state: Tensor, g: Tensor, met: Tensor, rate: Tensor, correct: Tensor, keep: float, betas: Betas) -> None:
+def _adam(state: Tensor, g: Tensor, met: Tensor, rate: Tensor, correct: Tensor, betas: Betas) -> None:
     values, first, second = state
     new_first = betas[0] * first + (1 - betas[0]) * g
     new_second = betas[1] * second + (1 - betas[1]) * g * g
     step = rate * (new_first * correct[0]) / ((new_second * correct[1]).sqrt() + EPSILON)
-    values.copy_(torch.where(met, (values - step) * keep, values))
+    values.copy_(torch.where(met, values - step, values))
     first.copy_(torch.where(met, new_first, first))
     second.copy_(torch.where(met, new_second, second))
 
@@ -186,7 +166,7 @@ def follow_step(
     parts = (frame_colour, colour_moments), (frame_alpha, alpha_moments)
     for (values, moments), slope, rate in zip(parts, slopes, rates, strict=True):
         stacked = torch.cat([values[own][None], moments])
-        _adam(stacked, slope, torch.ones_like(slope, dtype=torch.bool), rate, correct, 1.0, betas)
+        _adam(stacked, slope, torch.ones_like(slope, dtype=torch.bool), rate, correct, betas)
         values[own] = stacked[0]
         moments.copy_(stacked[1:])
     texture[own] = activate(static[0][own], static[1][own], frame_colour[own], frame_alpha[own])

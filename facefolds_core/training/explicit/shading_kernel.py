@@ -240,43 +240,6 @@ def _meet(k, p, codes, texture, shine, terms, index, wish, own):  # type: ignore
     return m, transmittance, r0, r1, r2
 
 
-@kernel(parallel=True)
-def contributions(codes, rays, texture, peak, min_light):  # type: ignore[no-untyped-def]
-    """What each texel adds to a ray's opacity at most: T w alpha; w bilinear weight, T transmittance before it.
-
-    codes (P, N, 2) as above, rays (R,) which of them to look at, texture (H, W, N, 4); peak (N, H, W) float32 is raised
-    to what is found. Nothing is added behind less transmittance than `min_light`.
-    """
-    layers, count = texture.shape[2], rays.shape[0]
-    before = np.empty((layers, CHUNK), np.float32)
-    for start in range(0, count, CHUNK):
-        own = min(CHUNK, count - start)
-        for k in prange(own):
-            light_before(k, rays[start + k], codes, texture, before, min_light)
-        for task in prange(layers):
-            n = spread(task, layers)
-            for k in range(own):
-                p = rays[start + k]
-                if codes[p, n, 0] == 0 or before[n, k] == 0:
-                    continue
-                for tap in range(4):
-                    i, j, share = tap_share(codes, p, n, tap, texture)
-                    peak[n, i, j] = max(peak[n, i, j], before[n, k] * share)
-
-
-@compiled
-def light_before(k: Any, p: Any, codes: Any, texture: Any, before: Any, min_light: Any) -> None:
-    """Transmittances of ray p before each layer into before[:, k], 0 for less than `min_light`."""
-    height, width, layers = texture.shape[0], texture.shape[1], texture.shape[2]
-    transmittance = np.float32(1.0)
-    for n in range(layers):
-        before[n, k] = transmittance if transmittance >= min_light else np.float32(0.0)
-        if codes[p, n, 0] > 0 and transmittance >= min_light:
-            j, b = corner(codes[p, n, 0], width)
-            i, a = corner(codes[p, n, 1], height)
-            transmittance *= 1 - rgba_tap(texture, np.uint64(i), np.uint64(j), np.uint64(n), 3, a, b)
-
-
 @inlined
 def tap_share(codes, p, n, tap, texture):  # type: ignore[no-untyped-def]
     """Row and column of one of four texels around the crossing of ray p with layer n; bilinear weight times alpha."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -17,10 +18,13 @@ from facefolds_core.training.explicit.rates import BETAS
 from facefolds_core.training.explicit.reflection_kernel import look
 from facefolds_core.training.explicit.smoothing import smooth
 from facefolds_core.training.explicit.targets import CutOuts
-from facefolds_core.training.explicit.views import Rays, Views
+from facefolds_core.training.explicit.views import Views
+
+FAINT = 1 / 255
+"""Opacity of a code of a picture: less than that can be left out."""
 
 UNSEEN_LOGIT = -9.0
-"""Of texels that no training ray has met: transparent. `adam_kernel` keeps logits within 9 of 0."""
+"""Of texels that show nothing. `adam_kernel` keeps logits within 9 of 0."""
 
 MIN_OPACITY, MAX_OPACITY = 0.003, 0.995
 """Bounds of a layer's opacity at the start: a logit can return from there within a level."""
@@ -47,13 +51,15 @@ class TextureState:
     Attributes:
         shape: (H, W).
         colour [3, M, 3], layers [3, M, N, 4], frame_colour [3, K, M, 3], frame_alpha [3, K, M, N].
-        start: [rows, columns, 4] colour and opacity of all layers together at the start, over the window with its
-            borders at the first and last rows and columns.
         params: of the training.
         shine: (P, 3) what the reflection adds to each ray of the views; (0, 3) where there is none.
         steps: [K] Adam steps on each frame since the grids last grew; their sum is the static part's.
         believed: [M, N] logits of alpha at the start, which steps draw the static ones to; None draws nowhere.
-        pace: share of a step's decay that a step makes (`Level.pace`).
+        pace: share of the way back to what is believed that a step makes (`Level.pace`).
+
+    Args:
+        start: [rows, columns, 3] colour at the start, over the window with its borders at the first and last rows and
+            columns.
     """
 
     pace = 1.0
@@ -73,8 +79,9 @@ class TextureState:
         self.layers = torch.zeros(3, m, layers, 4)
         self.frame_colour = torch.zeros(3, frames, m, 3)
         self.frame_alpha = torch.zeros(3, frames, m, layers)
-        self.start = start
-        self.colour[0] = self._start()[:, :3]
+        image = start.permute(2, 0, 1)[None]
+        image = torch.nn.functional.interpolate(image, size=shape, mode="bilinear", align_corners=False)
+        self.colour[0] = image[0].permute(1, 2, 0).reshape(-1, 3)
         self.shine = np.zeros((0, 3), np.float32)
         self.believed: Tensor | None = None
         self._allocate()
@@ -102,16 +109,6 @@ class TextureState:
     def believe(self, opacity: NDArray[np.float32]) -> None:
         """Keep the layers' opacity near this, (M, N), where pictures say little."""
         self.believed = _logits(opacity)
-
-    def _start(self) -> Tensor:
-        """[M, 4]: `start` at the texels."""
-        image = self.start.permute(2, 0, 1)[None]
-        image = torch.nn.functional.interpolate(image, size=self.shape, mode="bilinear", align_corners=False)
-        return image[0].permute(1, 2, 0).reshape(-1, 4)
-
-    def beside(self, least: float) -> Tensor:
-        """[M, 1] bool: texels in directions in which there was less opacity than `least` at the start."""
-        return self._start()[:, 3:] < least
 
     def grow(self, shape: tuple[int, int]) -> None:
         """Resample all values to H x W texels (bilinear) and start the moments afresh."""
@@ -190,16 +187,10 @@ class TextureState:
             texture.numpy(),
             self.gradient.numpy(),
             rates,
-            self.kept_of_frames,
             correct,
             decays(BETAS),
         )
         return squares
-
-    @property
-    def kept_of_frames(self) -> np.float32:
-        """Factor by which the frames' parts shrink each step."""
-        return np.float32(self.params.textures.frame_decay**self.pace)
 
     def smooth_alpha(self, frame: int) -> None:
         """Replace the logits of alpha, static and of one frame, by their means over 3 x 3 texels; moments stay."""
@@ -220,21 +211,13 @@ class TextureState:
         cut, behind = pictures.cut(frame), pictures.behind
         look(views.codes, views.camera, views.pixel, cut, behind, texture, seen, MIN_LIGHT)
 
-    def contributions(self, source: Rays, passes: int) -> Tensor:
-        """[M, N]: what each texel adds to a ray's opacity at most, over all frames and, in `passes` parts, all rays."""
-        (h, w), frames = self.shape, len(self.steps)
-        n = self.layers.shape[2]
-        peak = torch.zeros(n, h, w)
-        for i in range(max(passes, frames)):
-            views, rays = source.part(i % frames, i % passes, passes)
-            texture = self.activated(i % frames).view(h, w, n, 4)
-            shading_kernel.contributions(views.codes, rays, texture.numpy(), peak.numpy(), MIN_LIGHT)
-        return peak.view(n, -1).T.contiguous()
-
-    def hide(self, unseen: Tensor) -> None:
-        """Make texels [M, N] bool transparent."""
-        self.layers[0, ..., 3] = torch.where(unseen, UNSEEN_LOGIT, self.layers[0, ..., 3])
-        self.frame_alpha[0] = torch.where(unseen, 0.0, self.frame_alpha[0])
+    def drop_faint(self) -> None:
+        """Make texels transparent that stay under `FAINT` in all frames. What no ray has met is as opaque
+        as it began, `MIN_OPACITY`, in all layers: a veil over white."""
+        most = self.layers[0, ..., 3] + self.frame_alpha[0].amax(0)
+        faint = most < math.log(FAINT / (1 - FAINT))
+        self.layers[0, ..., 3] = torch.where(faint, UNSEEN_LOGIT, self.layers[0, ..., 3])
+        self.frame_alpha[0] = torch.where(faint, 0.0, self.frame_alpha[0])
 
     def forget_moments(self) -> None:
         """Give their memory back, two thirds of the grids'; no `step` can follow."""

@@ -21,7 +21,6 @@ from facefolds_core.params import ExplicitParams
 from facefolds_core.subject.outline import texel_uv
 from facefolds_core.subject.volume import Volume
 from facefolds_core.training.explicit.cameras import CameraChoice
-from facefolds_core.training.explicit.clearing import clear_texels
 from facefolds_core.training.explicit.fit import Fit, least_middle, recentre, volume_in
 from facefolds_core.training.explicit.follow import follow, follow_rates
 from facefolds_core.training.explicit.gloss import GlossFit
@@ -134,7 +133,7 @@ class Trainer:
         )
 
     def _new_state(self, texels: tuple[int, int]) -> TextureState:
-        start = torch.from_numpy(np.concatenate([self.fit.rgb, self.fit.opacity[..., None]], -1)).float()
+        start = torch.from_numpy(self.fit.rgb).float()
         shape = (self.layers, self.scene.num_frames)
         return TextureState(texels, *shape, start, self.params)
 
@@ -239,7 +238,7 @@ class Trainer:
         assert self.state is not None and self.views is not None
         state = self.state
         state.forget_moments()
-        self.events += clear_texels(state, self.views, self._stride(), self.params.pruning)
+        state.drop_faint()
         above, below = self._kept_layers(state)
         first, last, stay = above[0], above[-1], [*above, *below]
         radii = self.manifolds().radii().detach()

@@ -62,7 +62,7 @@ class FrameFitter:
         self.pictures = CutOuts(scene, base.surroundings.gains, kept_bytes=0)
         h, w = base.spec.texels
         shape = (base.spec.num_layers, 1)
-        self.state = TextureState((h, w), *shape, torch.zeros(2, 2, 4), self.params)
+        self.state = TextureState((h, w), *shape, torch.zeros(2, 2, 3), self.params)
         with torch.no_grad():
             self.state.colour[0].copy_(base.textures.colour.view(h * w, 3))
             self.state.layers[0].copy_(base.textures.layers.view(h * w, -1, 4))
