@@ -43,7 +43,7 @@ FIDELITY = 42.0
 MESHES = (16, 24, 32, 48, 64)
 """R^m that are tried."""
 
-LOSS = 0.1
+LOSS = 0.08
 """Largest loss of PSNR against the photos of what is taken, to the best candidate's, dB. The codec adds its own."""
 
 TEXELS = (128, 192, 256, 384, 512)

@@ -13,10 +13,8 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import maximum_filter
 
 from facefolds_core.export.collapse_kernel import collapse
-from facefolds_core.export.cover_kernel import covers
 from facefolds_core.export.quadrics_kernel import build_quadrics
 from facefolds_core.export.refit import refit_radii
 from facefolds_core.export.sheets import Array, sheet_faces, sheet_mesh, vertex_uv
@@ -36,15 +34,12 @@ EMPTY_WEIGHT = 0.001
 MIN_AREA = 0.001
 """Least area of a triangle, as a share of half a grid cell."""
 
-MARGIN = 2
-"""Triangles this near, in samples, to a place that shows are kept."""
-
 
 def decimated_ladder(sheets: Sheets, counts: Sequence[int]) -> dict[int, list[TexturedMesh]]:
     """Number of vertices -> meshes of all layers, outermost first, over one triangulation; one sequence of collapses.
 
-    A layer lacks the triangles that hold nothing of it: no sample in or near them has an alpha of 1/255 or more in any
-    frame. What is left out would have shown as alpha 0, so nothing changes. A layer that shows nowhere keeps all.
+    Triangles that hold nothing stay: the nearest hit of a layer counts, so that through a hole in the front of a head
+    the back of that layer would be drawn over all others. `asset.cropping` leaves out those that hide nothing.
     """
     st, uv, faces = sheets.st.reshape(-1, 2), vertex_uv(sheets), sheet_faces(sheets)
     groups = np.array_split(np.arange(sheets.num_layers), min(MEASURED_LAYERS, sheets.num_layers))
@@ -56,28 +51,11 @@ def decimated_ladder(sheets: Sheets, counts: Sequence[int]) -> dict[int, list[Te
     targets = sorted(set(counts), reverse=True)
     borders = _borders(len(sheets.st))
     left = collapse(st, sheets.chart.unrolled(uv), borders, points, faces, quadrics, np.array(targets), MIN_AREA * cell)
-    opaque = maximum_filter(sheets.opacity > 0, (1, 2 * MARGIN + 1, 2 * MARGIN + 1))
-    near = np.ascontiguousarray(opaque.transpose(1, 2, 0))
-    return {
-        target: _meshes(sheets, shows, near, corners[corners[:, 0] >= 0], uv)
-        for target, corners in zip(targets, left, strict=True)
-    }
-
-
-def _meshes(
-    sheets: Sheets,
-    shows: Array,
-    near: NDArray[np.bool_],
-    faces: NDArray[np.int64],
-    uv: Array,
-) -> list[TexturedMesh]:
-    """The layers over a triangulation, radii fitted, what holds nothing left out."""
-    fitted = refit_radii(sheets, shows, faces, uv)
-    kept = covers(faces, len(sheets.st), near)
-    meshes = []
-    for layer in range(sheets.num_layers):
-        own = kept[:, layer] if kept[:, layer].any() else np.ones(len(faces), bool)
-        meshes.append(sheet_mesh(fitted, layer, faces[own], uv))
+    meshes = {}
+    for target, corners in zip(targets, left, strict=True):
+        used = corners[corners[:, 0] >= 0]
+        fitted = refit_radii(sheets, shows, used, uv)
+        meshes[target] = [sheet_mesh(fitted, layer, used, uv) for layer in range(sheets.num_layers)]
     return meshes
 
 

@@ -35,18 +35,3 @@ def locate(faces, n):  # type: ignore[no-untyped-def]
                 if _holds(corners, r, c):
                     found[r, c] = f
     return found
-
-
-@kernel
-def covers(faces, n, opaque):  # type: ignore[no-untyped-def]
-    """(F, N) bool: faces (F, 3) that hold a vertex of the n x n grid with `opaque` (n, n, N), corners included."""
-    found = np.zeros((faces.shape[0], opaque.shape[2]), np.bool_)
-    corners = np.empty((3, 2), np.int64)
-    for f in range(faces.shape[0]):
-        _corners(faces, f, n, corners)
-        for r in range(corners[:, 0].min(), corners[:, 0].max() + 1):
-            for c in range(corners[:, 1].min(), corners[:, 1].max() + 1):
-                if _holds(corners, r, c):
-                    for layer in range(opaque.shape[2]):
-                        found[f, layer] |= opaque[r, c, layer]
-    return found
