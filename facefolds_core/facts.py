@@ -45,7 +45,8 @@ WORDS = {
     "sound_does_not_fit": "{file}: the frames in use are not evenly spaced, so no sound fits them",
     "colours_corrected": "note: colours of {count} cameras are corrected by {file}",
     # of a training: why it chose as it did
-    "centre_chosen": "chart: the candidate that loses least of the visible surface ({lost:.1%})",
+    "centre_chosen": "chart: of the candidates that lose least of the visible surface, within {tie:.1%}, "
+    "the one farthest back (it loses {lost:.1%})",
     "window_chosen": "window: directions in which the subject is at least {opacity:.0%} opaque (and the tracked mesh, "
     "where there is one), and {margin} on each side",
     "middle_from_volume": "middle radius: where half of the subject's opacity is reached from outside",

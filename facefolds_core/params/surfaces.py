@@ -13,14 +13,17 @@ class StartParams(Section):
     """Charts that are tried for the subject as it was found."""
 
     centres: Annotated[Many[Annotated[float, Field(ge=-10, le=10)]], Field(min_length=1, max_length=1000)] = (
-        *(-0.15, -0.2, -0.25, -0.3, -0.35, -0.4),
+        *(-0.1, -0.15, -0.2, -0.25),
+        *(-0.3, -0.35, -0.4),
     )
-    """Candidates for x of the sphere centre c = (x, 0, 0), units; nearer to the face layers have no room. The paper's
-    is -0.25."""
+    """Candidates for x of the sphere centre c = (x, 0, 0), units. The paper's is -0.25."""
 
     belts: Annotated[Many[Annotated[float, Field(ge=0, le=80)]], Field(max_length=100)] = (10.0, 30.0)
     """Candidates for a belt, degrees below level, tried with each centre beside the plain sphere. Below it rays start
     lower on the neck's axis."""
+
+    centre_tie: ClassVar[float] = 0.002
+    """Of the charts within this of the least loss of visible surface, the one farthest back wins."""
 
     centre_nodes: ClassVar[int] = 96
     """Rows of the coarse radius map by which charts are compared."""

@@ -145,7 +145,7 @@ def lost_share(volume: Volume, chart: Chart, points: Array, params: StartParams)
 
 
 def choose_chart(volume: Volume, points: Array, params: StartParams) -> tuple[Chart, dict[Chart, float]]:
-    """The chart that loses the smallest share of `points`, and the shares of all candidates.
+    """The chart that loses (nearly) the smallest share of `points`, and the shares of all candidates.
 
     Raises:
         UserError: if there are no points.
@@ -161,7 +161,11 @@ def choose_chart(volume: Volume, points: Array, params: StartParams) -> tuple[Ch
         )
     charts = [chart for x in params.centres for chart in _charts(x, points, params)]
     losses = {chart: lost_share(volume, chart, points, params) for chart in charts}
-    return min(losses, key=losses.__getitem__), losses
+    least = min(losses.values())
+    best = min(
+        (c for c, loss in losses.items() if loss <= least + params.centre_tie), key=lambda c: (c.centre[0], losses[c])
+    )
+    return best, losses
 
 
 def _charts(x: float, points: Array, params: StartParams) -> list[Chart]:

@@ -165,7 +165,7 @@ def _reasons(params: ExplicitParams, lost: float, middle: Fact, most: float, sec
     """One a choice."""
     start, geometry = params.start, params.geometry
     return (
-        fact("centre_chosen", lost=lost),
+        fact("centre_chosen", tie=start.centre_tie, lost=lost),
         fact("window_chosen", opacity=start.subject_opacity, margin=WINDOW_MARGIN),
         middle,
         fact("halfwidth_chosen", least=geometry.halfwidth, most=most),
