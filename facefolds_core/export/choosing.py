@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from facefolds_core.asset.packing import AtlasLayout
 from facefolds_core.captures.scene import Scene, Split
 from facefolds_core.export.stores import Grids
 from facefolds_core.export.textures import resample
@@ -46,7 +47,7 @@ MESHES = (16, 24, 32, 48, 64)
 LOSS = 0.08
 """Largest loss of PSNR against the photos of what is taken, to the best candidate's, dB. The codec adds its own."""
 
-TEXELS = (128, 192, 256, 384, 512)
+TEXELS = (128, 192, 256, 384, 512, 768)
 """R^t that are tried, below that of the samples, which is tried, too."""
 
 
@@ -217,13 +218,14 @@ def choose_meshes(
 
 
 def choose_texels(scene: Scene, meshes: Sequence[TexturedMesh], grids: Grids, textures: FrameStore) -> tuple[int, Fact]:
-    """R^t: the least of `TEXELS` that is good enough, and why; none is finer than the samples.
+    """R^t: the least of `TEXELS` that is good enough, and why; none is finer than the samples, all fit into a video.
 
     Args:
         meshes: of all layers.
         grids, textures: as they were sampled.
     """
-    candidates = sorted({c for c in TEXELS if c < textures.height} | {textures.height})
+    tried = sorted({c for c in TEXELS if c < textures.height} | {textures.height})
+    candidates = [c for c in tried if AtlasLayout.pack([(c, c)] * len(meshes)).fits()] or tried[:1]
     split, looks = looks_of(scene)
     seen = _seen(scene, looks, meshes, _windows(grids), grids.reflection, textures)
     images = {s.look.frame: s.images for s in seen}

@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from facefolds_core.asset import packing
+from facefolds_core.asset.packing import AtlasLayout
 from facefolds_core.captures.scene import Scene
 from facefolds_core.export import choosing, steps
 from facefolds_core.export.choosing import choose_meshes, choose_texels, explained, looks_of
@@ -104,6 +106,13 @@ def small(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_textures_are_no_finer_than_what_they_show(tmp_path: Path, period: float, least: int) -> None:
     filmed = film(tmp_path, period, noise=20.0)
     assert choose_texels(filmed.scene, [ball(64)], matte(), filmed.textures)[0] == least
+
+
+def test_textures_fit_into_a_video(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """All layers whole: what a layer does not show is cropped later."""
+    filmed = film(tmp_path, 5.0, noise=20.0)
+    monkeypatch.setattr(packing, "MAX_PIXELS", AtlasLayout.pack([(64, 64)]).pixels - 1)
+    assert choose_texels(filmed.scene, [ball(64)], matte(), filmed.textures)[0] == 48
 
 
 def test_photos_that_the_model_does_not_show_let_no_detail_go(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
