@@ -66,7 +66,7 @@ def test_what_stays_fainter_than_a_code_in_all_frames_goes() -> None:
     shown[1] = 0.3  # in one frame
     state.fill(usual)
     state.fill_frame(2, shown)
-    state.drop_faint()
+    state.clear()
     shown[0] = usual[0] = 0
     for frame, opacity in enumerate((usual, usual, shown)):
         np.testing.assert_allclose(state.activated(frame)[..., 3].numpy(), opacity, atol=2e-4)

@@ -14,6 +14,7 @@ from torch import Tensor
 from facefolds_core.kernels.adam import corrections, decays
 from facefolds_core.params import ExplicitParams
 from facefolds_core.training.explicit import adam_kernel, shading_kernel
+from facefolds_core.training.explicit.clearing import loose
 from facefolds_core.training.explicit.rates import BETAS
 from facefolds_core.training.explicit.reflection_kernel import look
 from facefolds_core.training.explicit.smoothing import smooth
@@ -211,13 +212,15 @@ class TextureState:
         cut, behind = pictures.cut(frame), pictures.behind
         look(views.codes, views.camera, views.pixel, cut, behind, texture, seen, MIN_LIGHT)
 
-    def drop_faint(self) -> None:
-        """Make texels transparent that stay under `FAINT` in all frames. What no ray has met is as opaque
-        as it began, `MIN_OPACITY`, in all layers: a veil over white."""
+    def clear(self) -> None:
+        """Make texels transparent that stay under `FAINT` in all frames, and what is `loose`. What no ray has met is as
+        opaque as it began, `MIN_OPACITY`, in all layers: a veil over white."""
         most = self.layers[0, ..., 3] + self.frame_alpha[0].amax(0)
-        faint = most < math.log(FAINT / (1 - FAINT))
-        self.layers[0, ..., 3] = torch.where(faint, UNSEEN_LOGIT, self.layers[0, ..., 3])
-        self.frame_alpha[0] = torch.where(faint, 0.0, self.frame_alpha[0])
+        light = torch.stack([(1 - self.activated(k)[..., 3]).prod(1) for k in range(len(self.steps))]).amin(0)
+        apart = torch.from_numpy(loose(1 - light.view(self.shape).numpy()).reshape(-1, 1))
+        gone = (most < math.log(FAINT / (1 - FAINT))) | apart
+        self.layers[0, ..., 3] = torch.where(gone, UNSEEN_LOGIT, self.layers[0, ..., 3])
+        self.frame_alpha[0] = torch.where(gone, 0.0, self.frame_alpha[0])
 
     def forget_moments(self) -> None:
         """Give their memory back, two thirds of the grids'; no `step` can follow."""

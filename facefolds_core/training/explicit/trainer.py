@@ -238,7 +238,7 @@ class Trainer:
         assert self.state is not None and self.views is not None
         state = self.state
         state.forget_moments()
-        state.drop_faint()
+        state.clear()
         above, below = self._kept_layers(state)
         first, last, stay = above[0], above[-1], [*above, *below]
         radii = self.manifolds().radii().detach()
