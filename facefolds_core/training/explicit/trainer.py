@@ -235,7 +235,7 @@ class Trainer:
 
     def result(self, fingerprint: str) -> tuple[RadianceManifolds, ExplicitSpec]:
         """The model, without the layers that show nothing."""
-        assert self.state is not None and self.views is not None
+        assert self.state is not None
         state = self.state
         state.forget_moments()
         state.clear()
