@@ -25,13 +25,13 @@ class GridTextureParams(Section):
     learning_rate: Rate = 0.02
     """Of the colours shared by layers and frames; it falls along the last level. The other rates are factors on it."""
 
-    full_rate_iterations: Count = 460
+    full_rate_iterations: Count = 340
     """Of more `iterations` than these, the steps at half and full resolution are smaller in proportion, and smoothing
     is rarer: they go the same way more finely. At full rate four times as many lost 0.3 dB
     on cameras left out (`mugsy`, `studio`), since layers begin to show each camera its own picture."""
 
     steps_per_frame: Count = 20
-    """Of the iterations after the rounds of geometry there are at least so many a frame of the capture: two fifths of
+    """Of the iterations after the coarse ones there are at least so many a frame of the capture: two fifths of
     them at half resolution. With a fixed number a film of 200 frames stood still (6 % of what changes was explained,
     against 28 % with 20 frames); twelve frames have 23 without it."""
 
@@ -62,8 +62,9 @@ class FollowParams(Section):
 class MovingParams(Section):
     """What a head that turns (`normalize.stabilize`) needs beside: its rays meet other texels in each frame."""
 
-    cache_megabytes: Annotated[int, Field(ge=0, le=1_000_000)] = 2048
-    """Memory for the crossings of all frames' rays, MB; what does not fit is traced anew each time."""
+    cache_megabytes: Annotated[int, Field(ge=0, le=1_000_000)] = 3072
+    """Memory for the crossings of all frames' rays, MB; what does not fit is traced anew each time, which can take ten
+    times as long as the rest."""
 
 
 class ExplicitParams(Section):
@@ -82,9 +83,8 @@ class ExplicitParams(Section):
     layers: Annotated[int, Field(ge=1, le=64)] = 12
     """Number of nested layers, N. Where cameras see beneath an overhang there are four more."""
 
-    iterations: Count = 300
-    """Adam steps of rounds and textures together. More are made where `geometry` or `textures.steps_per_frame` need
-    them."""
+    iterations: Count = 180
+    """Adam steps, 60 of them coarse. More are made where `textures.steps_per_frame` needs them."""
 
     start: StartParams = StartParams()
     """Charts that are tried for the subject as it was found."""
@@ -106,8 +106,3 @@ class ExplicitParams(Section):
 
     segments: SegmentParams = SegmentParams()
     """Of takes that are too long to be trained at once."""
-
-    @property
-    def least_iterations(self) -> int:
-        """That are run even if fewer are asked for: all rounds, and a few with the final geometry."""
-        return self.geometry.round_iterations * len(self.geometry.rounds) + 3
