@@ -25,13 +25,13 @@ class GridTextureParams(Section):
     learning_rate: Rate = 0.02
     """Of the colours shared by layers and frames; it falls along the last level. The other rates are factors on it."""
 
-    full_rate_iterations: Count = 340
+    full_rate_iterations: Count = 400
     """Of more `iterations` than these, the steps at half and full resolution are smaller in proportion, and smoothing
     is rarer: they go the same way more finely. At full rate four times as many lost 0.3 dB
     on cameras left out (`mugsy`, `studio`), since layers begin to show each camera its own picture."""
 
     steps_per_frame: Count = 20
-    """Of the iterations after the coarse ones there are at least so many a frame of the capture: two fifths of
+    """Of the iterations after the rounds of geometry there are at least so many a frame of the capture: two fifths of
     them at half resolution. With a fixed number a film of 200 frames stood still (6 % of what changes was explained,
     against 28 % with 20 frames); twelve frames have 23 without it."""
 
@@ -83,8 +83,9 @@ class ExplicitParams(Section):
     layers: Annotated[int, Field(ge=1, le=64)] = 12
     """Number of nested layers, N. Where cameras see beneath an overhang there are four more."""
 
-    iterations: Count = 180
-    """Adam steps, 60 of them coarse. More are made where `textures.steps_per_frame` needs them."""
+    iterations: Count = 240
+    """Adam steps of rounds and textures together. More are made where `geometry` or `textures.steps_per_frame` need
+    them."""
 
     start: StartParams = StartParams()
     """Charts that are tried for the subject as it was found."""
@@ -106,3 +107,8 @@ class ExplicitParams(Section):
 
     segments: SegmentParams = SegmentParams()
     """Of takes that are too long to be trained at once."""
+
+    @property
+    def least_iterations(self) -> int:
+        """That are run even if fewer are asked for: all rounds, and a few with the final geometry."""
+        return self.geometry.round_iterations * len(self.geometry.rounds) + 3

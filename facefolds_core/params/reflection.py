@@ -15,8 +15,8 @@ class ReflectionParams(Section):
     enabled: bool = True
     """Try a reflection; it is left out all the same where it does not help."""
 
-    begin: Literal["coarse", "end"] = "coarse"
-    """When the reflection is first fitted: to coarse textures, or to finished ones. "end" is best for
+    begin: Literal["rounds", "end"] = "rounds"
+    """When the reflection is first fitted: in the first round of geometry, or to finished textures. "end" is best for
     programs that cannot draw it (GLB, OpenUSD)."""
 
     texels: Annotated[int, Field(ge=2, le=256)] = 96

@@ -6,7 +6,7 @@ from typing import Annotated, ClassVar
 
 from pydantic import Field
 
-from facefolds_core.params.base import Length, Many, Section
+from facefolds_core.params.base import Count, Length, Many, Pixels, Section
 
 
 class StartParams(Section):
@@ -42,7 +42,7 @@ class StartParams(Section):
 
 
 class GeometryParams(Section):
-    """The radius maps of the layers."""
+    """The radius maps of the layers, and the rounds in which they move to the opacity found."""
 
     nodes: Annotated[int, Field(ge=8, le=4096)] = 384
     """Nodes along the longer side of the radius maps."""
@@ -52,3 +52,13 @@ class GeometryParams(Section):
 
     max_halfwidth: Length = 0.015
     """Largest distance of a layer from the middle, units."""
+
+    rounds: Annotated[Many[Annotated[float, Field(gt=0, le=100)]], Field(min_length=1, max_length=100)] = (1.6, 1.0)
+    """Halfwidths of the rounds of geometry, in halfwidths of the model."""
+
+    round_iterations: Count = 60
+    """Adam steps of each round."""
+
+    blur: Pixels = 6.0
+    """Smoothing of the layers' motion between rounds, standard deviation, nodes. With eight cameras 12 gained,
+    with thinner layers."""

@@ -31,7 +31,8 @@ SMALLER = {
     "cameras=12, frames=3, height=96, width=64": "name='anna', folder='FOLDER/data', mattes=True, "
     "cameras=8, frames=2, height=48, width=32",
     "iterations=400": "iterations=60",
-    'layers=6, iterations=100, geometry={"nodes": 96}': 'layers=3, iterations=23, geometry={"nodes": 48}',
+    'layers=6, iterations=150, geometry={"nodes": 96, "round_iterations": 30}': "layers=3, iterations=63, "
+    'geometry={"nodes": 48, "round_iterations": 20}',
     'export("face", sample={"resolution": 96}, decimate={"resolution": 24}, texture={"resolution": 96}': "export("
     f"'FOLDER/face', **{CUT}",
 }

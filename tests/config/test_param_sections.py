@@ -85,9 +85,9 @@ def test_absurd_frame_rates_are_refused(tmp_path: Path, fps: str) -> None:
 
 
 def test_whole_numbers_and_lists_do_for_floats_and_tuples() -> None:
-    made = train_params({"follow": {"min_error": 1}, "start": {"belts": [3, 1]}})
+    made = train_params({"follow": {"min_error": 1}, "geometry": {"rounds": [3, 1]}})
     assert isinstance(made, ExplicitParams)
-    assert made.follow.min_error == 1.0 and made.start.belts == (3.0, 1.0)
+    assert made.follow.min_error == 1.0 and made.geometry.rounds == (3.0, 1.0)
 
 
 OF_PERCEPTRONS = sorted(set(MlpParams.model_fields) - set(ExplicitParams.model_fields) - OLD)

@@ -46,7 +46,7 @@ TRAIN: dict[str, Any] = {
     "preset": "fast",
     "iterations": 190,
     "layers": 6,
-    "geometry": {"nodes": 128},
+    "geometry": {"nodes": 128, "round_iterations": 20},
 }
 EXPORT: dict[str, Any] = {
     "sample": {"resolution": 96},

@@ -17,7 +17,7 @@ subjects:
     source: actor
     path: facefolds_core/captures/actor
     holdout: {every: 4}
-    train: {preset: fast, iterations: 60, layers: 3, geometry: {nodes: 48},
+    train: {preset: fast, iterations: 60, layers: 3, geometry: {nodes: 48, round_iterations: 20},
             reflection: {texels: 6, environment_texels: 4}}
   stabilised:
     source: actor

@@ -123,7 +123,7 @@ def test_fingerprint_tells_configurations_and_scenes_apart(scene: Scene, tmp_pat
 
 
 @pytest.mark.parametrize(
-    "values", [{"textures": {"smooth_every": 4}}, {"follow": {"steps": 3}}, {"geometry": {"nodes": 40}}]
+    "values", [{"textures": {"smooth_every": 4}}, {"follow": {"steps": 3}}, {"geometry": {"rounds": [2.0]}}]
 )
 def test_the_fingerprint_of_the_explicit_model_has_its_nested_keys(scene: Scene, values: dict[str, object]) -> None:
     usual = train_params({"preset": "fast"})

@@ -15,9 +15,10 @@ from facefolds_core.errors import UserError
 from facefolds_core.facts import read_fact
 from facefolds_core.files.frame_store import write_frames
 from facefolds_core.model import load_model
+from facefolds_core.model.radial import RadialManifolds
 from facefolds_core.params import ExplicitParams, train_params
 from facefolds_core.subject.outline import Profile
-from facefolds_core.training.explicit import fit
+from facefolds_core.training.explicit import fit, trainer
 from facefolds_core.training.explicit.loop import fit_explicit
 from facefolds_core.training.explicit.state import TextureState
 from tests.scenes import OPAQUE, make_scene
@@ -28,7 +29,7 @@ GEOMETRY = ExplicitParams().geometry
 
 
 def _params(**values: object) -> ExplicitParams:
-    few = {"iterations": 18, "geometry": {"nodes": 48}}
+    few = {"iterations": 10, "geometry": {"nodes": 48, "round_iterations": 15}}
     small = {"layers": 6, "reflection": {"texels": 6, "environment_texels": 4}, **few}
     params = train_params({"preset": "fast", **small, **values})
     assert isinstance(params, ExplicitParams)
@@ -54,7 +55,7 @@ def _held_out_psnr(scene: Scene, folder: Path) -> float:
 def trained(tmp_path_factory: pytest.TempPathFactory) -> tuple[Scene, Path]:
     folder = tmp_path_factory.mktemp("explicit")
     scene = make_scene(folder / "scene", size=64, surface_radius=OPAQUE[0].radius, mattes=True)
-    params = _params(iterations=210, geometry={}, textures={"pixels_per_texel": 1.2})
+    params = _params(iterations=330, geometry={}, textures={"pixels_per_texel": 1.2})
     fit_explicit(scene, params, folder / "log").save(folder / "model")
     return scene, folder / "model"
 
@@ -88,10 +89,23 @@ def test_surface_points_lie_on_the_sphere(trained: tuple[Scene, Path]) -> None:
     assert valid.all()
     # The model's centre is fitted; the sphere stands around the scene's.
     assert (points[:, 0] - torch.tensor(SPHERE_CENTRE)).norm(dim=-1).mean().item() == pytest.approx(
-        OPAQUE[0].radius, abs=fit.pixel_size(trained[0])
+        OPAQUE[0].radius, abs=0.003
     )
     radius = (points[:, 0] - model.centre).norm(dim=-1)
     assert (radius[:-1] > radius[1:]).all()
+
+
+def test_recentring_finds_the_opaque_layer() -> None:
+    radii = np.broadcast_to(np.linspace(0.4, 0.3, 11), (20, 20, 11))
+    alpha = np.zeros((20, 20, 11), np.float32)
+    alpha[..., 3] = 1.0
+    moved = fit.recentre(radii, alpha, blur=2.0)
+    np.testing.assert_allclose(moved, radii[0, 0, 3] - 0.35, atol=1e-6)
+
+
+def test_recentring_stays_where_nothing_is_opaque() -> None:
+    radii = np.broadcast_to(np.linspace(0.4, 0.3, 11), (20, 20, 11))
+    np.testing.assert_allclose(fit.recentre(radii, np.zeros((20, 20, 11), np.float32), 2.0), 0, atol=1e-9)
 
 
 def test_layers_are_as_thin_as_asked_for_where_the_subject_is_sharp() -> None:
@@ -130,6 +144,22 @@ def test_divergence_is_reported(trained: tuple[Scene, Path], tmp_path: Path, mon
     with pytest.raises(UserError, match="diverged"):
         fit_explicit(trained[0], _params(), tmp_path / "log").save(tmp_path / "model")
     assert not (tmp_path / "model").exists()
+
+
+def test_layers_that_drift_inwards_stop_before_the_centre(
+    trained: tuple[Scene, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Thin hair does that: the search for crossings needs a radius to step along."""
+    monkeypatch.setattr(trainer, "recentre", lambda radii, *_: np.full(radii.shape[:2], -1.0))
+    fit_explicit(trained[0], _params(), tmp_path / "log").save(tmp_path / "model")
+    model = load_model(tmp_path / "model")
+    assert isinstance(model.manifolds, RadialManifolds)
+    assert fit.MIN_RADIUS <= model.manifolds.radii().min().item() < fit.MIN_RADIUS + 0.05
+
+
+def test_wide_layers_keep_their_distance_from_the_centre() -> None:
+    halfwidth = np.array([0.006, 0.03, 0.2])
+    assert (fit.least_middle(halfwidth, GEOMETRY) - max(GEOMETRY.rounds) * halfwidth >= fit.MIN_RADIUS - 1e-12).all()
 
 
 def test_a_missing_image_is_said_at_once(tmp_path: Path) -> None:

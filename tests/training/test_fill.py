@@ -11,10 +11,8 @@ from facefolds_core.params import ExplicitParams
 from facefolds_core.training.explicit.state import BELIEF, FAINT, MAX_OPACITY, MIN_OPACITY, TextureState
 from facefolds_core.training.explicit.views import Views
 
-COLOURS = np.full((24, 3, 3), 0.5, np.float32)
 
-
-def test_layers_begin_with_what_is_given() -> None:
+def test_layers_begin_with_what_is_given_and_keep_what_they_have_learnt() -> None:
     rng = np.random.default_rng(0)
     start = torch.tensor([0.3, 0.4, 0.5]).expand(2, 2, 3)
     state = TextureState((4, 6), 3, 2, start, ExplicitParams())
@@ -25,21 +23,30 @@ def test_layers_begin_with_what_is_given() -> None:
     np.testing.assert_allclose(begun[..., 3], opacity.clip(MIN_OPACITY, MAX_OPACITY), atol=1e-5)
     np.testing.assert_allclose(begun[1:, :, :3], rgb[1:], atol=1e-5)
     np.testing.assert_allclose(begun[0, :, :3], np.tile((0.3, 0.4, 0.5), (3, 1)), atol=1e-5)  # nothing is there
+    state.frame_alpha[0] += 1
+    state.layers[1:] += 1
+    state.fill(opacity[::-1].copy())
+    again = state.activated(1).numpy()
+    np.testing.assert_allclose(again[..., 3], opacity[::-1].clip(MIN_OPACITY, MAX_OPACITY), atol=1e-5)
+    np.testing.assert_allclose(again[..., :3], begun[..., :3], atol=1e-5)
+    assert not state.layers[1:].any()
 
 
 def test_a_frame_begins_with_an_opacity_of_its_own() -> None:
     state = TextureState((4, 6), 3, 2, torch.full((2, 2, 3), 0.5), ExplicitParams())
     usual, own = np.random.default_rng(0).uniform(0.1, 0.9, (2, 24, 3)).astype(np.float32)
-    state.fill(usual, COLOURS)
+    state.fill(usual)
     state.fill_frame(1, own)
     for frame, opacity in enumerate((usual, own)):
         np.testing.assert_allclose(state.activated(frame)[..., 3].numpy(), opacity, atol=1e-5)
+    state.fill(usual)
+    assert not state.frame_alpha.any()
 
 
 def test_steps_draw_opacity_back_to_what_is_believed() -> None:
     """A step on rays that meet nothing changes logits by this alone: of the difference 1 - BELIEF is left."""
     state = TextureState((4, 6), 3, 2, torch.full((2, 2, 3), 0.5), ExplicitParams())
-    state.fill(np.full((24, 3), 0.5, np.float32), COLOURS)
+    state.fill(np.full((24, 3), 0.5, np.float32))
     numbers = np.zeros(2, np.int32)
     views = Views.centred(np.zeros((2, 3, 2), np.uint16), numbers, numbers, np.zeros((2, 3), np.float32))
     step = partial(state.step, views, np.arange(2), OneColour(), 0, 0.0, np.full(5, 0.1, np.float32))
@@ -57,7 +64,7 @@ def test_what_stays_fainter_than_a_code_in_all_frames_goes() -> None:
     usual = np.array([[MIN_OPACITY], [0.9 * FAINT], [1.1 * FAINT], [0.5]], np.float32)
     shown = usual.copy()
     shown[1] = 0.3  # in one frame
-    state.fill(usual, COLOURS[:4, :1])
+    state.fill(usual)
     state.fill_frame(2, shown)
     state.clear()
     shown[0] = usual[0] = 0

@@ -28,7 +28,7 @@ from tests.training.test_workers import files
 pytestmark = pytest.mark.slow
 
 
-def lit(begin: Literal["coarse", "end"] = "coarse", **segments: object) -> ExplicitParams:
+def lit(begin: Literal["rounds", "end"] = "rounds", **segments: object) -> ExplicitParams:
     reflection = ReflectionParams(texels=4, environment_texels=4, begin=begin)
     return params(**segments).model_copy(update={"reflection": reflection})
 

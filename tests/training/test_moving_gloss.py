@@ -71,10 +71,6 @@ class Noise:
         """They stay over grey."""
 
 
-RADII = np.full((9, 9), 0.33)
-"""As `layers` has them."""
-
-
 def test_the_rays_of_a_fit_are_every_so_many_th_of_all_frames_together(scene: Scene) -> None:
     turns = Track.of([about((0, 0, 1), 5.0 * k) for k in range(6)], np.zeros((6, 3)))
     source = rays(replace(scene, frame_ids=tuple("abcdef"), poses=turns), share=150)
@@ -82,9 +78,9 @@ def test_the_rays_of_a_fit_are_every_so_many_th_of_all_frames_together(scene: Sc
     state.layers[0] = 4 * torch.randn(state.layers[0].shape, generator=torch.Generator().manual_seed(0))
     window = (-0.6, 0.6, -0.6, 0.6)
     every, some = (
-        GlossFit(
-            layers().chart, window, ReflectionParams(), turns, RADII, GlossParams(rays=most, moving_frames=5)
-        ).look(state, source, Noise())
+        GlossFit(layers().chart, window, ReflectionParams(), turns, GlossParams(rays=most, moving_frames=5)).look(
+            state, source, Noise()
+        )
         for most in (10**6, 100)
     )
     step = -(-len(every.st) // 100)
@@ -100,7 +96,7 @@ def test_steps_are_lit_as_the_head_stands_in_their_frame(scene: Scene) -> None:
     state = TextureState((8, 8), 3, 2, torch.full((2, 2, 3), 0.5), params())
     window, rng = (-0.6, 0.6, -0.6, 0.6), np.random.default_rng(0)
     given = ReflectionParams(texels=6, environment_texels=5)
-    gloss = GlossFit(layers().chart, window, given, turns, RADII)
+    gloss = GlossFit(layers().chart, window, given, turns)
     views, _ = source.part(1, 0, 1)
     gloss.light(state, views, 1)
     assert len(state.shine) == 0  # nothing is known yet
@@ -132,7 +128,8 @@ def test_nothing_is_fitted_before_anything_is_opaque(scene: Scene) -> None:
     """No gloss would be found then, and without gloss no light ever after."""
     state = TextureState((8, 8), 3, 6, torch.full((2, 2, 3), 0.5), params())
     source = StillRays(trace_views(scene, layers(), 1))
-    gloss = GlossFit(layers().chart, layers().window, ReflectionParams(texels=4, environment_texels=4), None, RADII)
+    gloss = GlossFit(layers().chart, layers().window, ReflectionParams(texels=4, environment_texels=4), None)
+    gloss.follow(state, source, Noise(), layers().middle.detach())
     for logit, fitted in ((-5.0, False), (5.0, True)):
         state.layers[0, ..., 3] = logit
         gloss.fit(state, source, Noise(), done=False)

@@ -187,7 +187,7 @@ def test_a_smoother_one_is_asked_for_where_little_is_gained(
 ) -> None:
     truth = _random_maps(3)
     seen, start = _seen(truth, 0.2), _start(truth)
-    gloss = GlossFit(Chart((0.0, 0.0, 0.0)), WINDOW, KEYS, None, np.full((9, 9), 0.3))
+    gloss = GlossFit(Chart((0.0, 0.0, 0.0)), WINDOW, KEYS, None)
     gloss.maps, gloss._normals = start, start.surface
     state = SimpleNamespace(shine=np.ones((3, 3), np.float32))
 

@@ -37,6 +37,7 @@ def params(**segments: object) -> ExplicitParams:
         "preset": "fast",
         "layers": 3,
         "iterations": 30,
+        "geometry": {"rounds": [1.0], "round_iterations": 10},
         "reflection": {"enabled": False},
         "textures": {"steps_per_frame": 4},
         "segments": {"joint_frames": 0, "key_frames": 2, "frames": 2, "steps": 3, **segments},

@@ -20,20 +20,20 @@ def test_mesh_is_kept_near_the_volume_and_left_far_from_it() -> None:
     mesh[:, 30:] = np.nan
     volume[:, :10] = 0.3 + 2 * REACH
     volume[20, 20] = np.nan
-    radii = blend(mesh, volume, REACH)
+    radii, kept = blend(mesh, volume, REACH)
     np.testing.assert_allclose(radii[:, :10], volume[:, :10])
     np.testing.assert_allclose(radii[:, 30:], 0.3 + 0.5 * REACH)
     assert radii[20, 20] == 0.3
     deep = np.where(np.arange(41) == 20, 0.3 - 2 * REACH, volume)
-    np.testing.assert_array_equal(blend(mesh, deep, REACH)[5, 20], 0.3)  # a hole of the volume
-    assert radii[5, 20] == 0.3
+    np.testing.assert_array_equal(blend(mesh, deep, REACH)[0][5, 20], 0.3)  # a hole of the volume
+    assert radii[5, 20] == 0.3 and kept[5, 20] == 1 and kept[5, 5] == 0 and kept[5, 35] == 0
 
 
 def test_where_few_cameras_look_the_mesh_is_believed_farther_from_the_volume() -> None:
     mesh, volume = np.full((41, 41), 0.3), np.full((41, 41), 0.3 + 2 * REACH)
-    radii = blend(mesh, volume, np.where(np.arange(41) < 20, FAR, REACH))
-    assert radii[5, 5] == 0.3
-    assert radii[5, 35] == 0.3 + 2 * REACH
+    radii, kept = blend(mesh, volume, np.where(np.arange(41) < 20, FAR, REACH))
+    assert radii[5, 5] == 0.3 and kept[5, 5] == 1
+    assert radii[5, 35] == 0.3 + 2 * REACH and kept[5, 35] == 0
 
 
 def test_a_mesh_has_no_radius_where_it_lies_behind_the_centre_only() -> None:

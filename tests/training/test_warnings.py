@@ -24,6 +24,7 @@ WELL = Fit(
     halfwidth=np.zeros((2, 2)),
     reach=np.zeros((2, 2)),
     second=np.zeros((2, 2)),
+    trust=np.zeros((2, 2)),
     rgb=np.zeros((2, 2, 3)),
     texels=(16, 16),
     reasons=(),

@@ -16,6 +16,7 @@ from facefolds_core.facts import Fact, fact
 from facefolds_core.geometry.chart import Chart
 from facefolds_core.geometry.sphere_uv import Window
 from facefolds_core.params import ExplicitParams, GeometryParams, StartParams
+from facefolds_core.rendering.compositing import transmittance_before
 from facefolds_core.subject.found import reference_frame
 from facefolds_core.subject.outline import (
     MIN_RADIUS,
@@ -35,6 +36,7 @@ from facefolds_core.training.explicit.tracked import (
     FAR,
     OPACITY,
     REACH,
+    TRUST,
     WELL_SEEN,
     blend,
     mesh_radii,
@@ -67,8 +69,9 @@ class Fit:
         window: (u0, u1, v0, v1).
         middle: starting radii of the middle of the layers, units.
         halfwidth: half the space between the outermost and the innermost layer, units, where the surface stands still.
-        reach: half of how far it moves beyond that over the frames, units; added to the halfwidth.
+        reach: half of how far it moves beyond that over the frames, units; added to any multiple of the halfwidth.
         second: middle radii of a second surface beneath the first, units; 0 where there is none.
+        trust: offsets of the layers from the start are shrunk by this much towards 0, units.
         rgb: of the start, (rows, columns, 3).
         texels: (H, W) of the finest textures.
         reasons: one a choice, and the notes.
@@ -84,6 +87,7 @@ class Fit:
     halfwidth: Array
     reach: Array
     second: Array
+    trust: Array
     rgb: Array
     texels: tuple[int, int]
     reasons: tuple[Fact, ...]
@@ -113,14 +117,14 @@ def fit_scene(scene: Scene, subject: FoundSubject, params: ExplicitParams, other
     seen = profile(volume, chart, uv, start.subject_opacity)
     opacity = seen.opacity.astype(np.float64)
     if surface is None or vertices is None:
-        known = seen.radius
+        known, kept = seen.radius, np.zeros((rows, columns))
         source = fact("middle_from_volume")
     else:
         mesh = mesh_radii(vertices, surface[1], chart, uv)
         share = seen_by(cameras, chart.points(uv, mesh).reshape(-1, 3)).reshape(mesh.shape) / len(cameras)
         unseen = (share < MIN_VIEW_SHARE) & np.isfinite(mesh)
         seen = replace(seen, radius=np.where(unseen, np.nan, seen.radius))
-        known = blend(mesh, seen.radius, np.where(share < WELL_SEEN, FAR, REACH))
+        known, kept = blend(mesh, seen.radius, np.where(share < WELL_SEEN, FAR, REACH))
         opacity = np.where(np.isfinite(mesh) & np.isnan(seen.radius), np.maximum(opacity, OPACITY), opacity)
         source = fact("middle_from_mesh", reach=REACH)
     middle = extrapolate(known).clip(MIN_RADIUS)
@@ -130,7 +134,7 @@ def fit_scene(scene: Scene, subject: FoundSubject, params: ExplicitParams, other
     radii = [profile(other, chart, uv, start.subject_opacity).radius for other in volumes]
     outwards, inwards = moves(seen.radius, radii, widths)
     middle, reach = middle + 0.5 * (outwards - inwards), 0.5 * (outwards + inwards)
-    middle = np.maximum(middle, MIN_RADIUS + widths + reach)
+    middle = np.maximum(middle, least_middle(widths, geometry) + reach)
     radius = float(np.quantile(middle[opacity >= start.subject_opacity], RADIUS_QUANTILE))
     texels = texel_count(scene, window, radius, params.textures.pixels_per_texel)
     second = second_surface(volume, chart, window, middle - widths - reach, cameras)
@@ -141,6 +145,7 @@ def fit_scene(scene: Scene, subject: FoundSubject, params: ExplicitParams, other
         halfwidth=widths,
         reach=reach,
         second=second,
+        trust=TRUST * kept + reach,
         rgb=seen.rgb.astype(np.float64),
         texels=texels,
         reasons=(*_reasons(params, losses[chart], source, most, second), *notes),
@@ -237,6 +242,11 @@ def moves(radius: Array, others: Sequence[Array], halfwidth: Array) -> tuple[Arr
     return found[0], found[1]
 
 
+def least_middle(halfwidth: Array, params: GeometryParams) -> Array:
+    """The smallest middle radius with which no layer of any round comes nearer to c than `MIN_RADIUS`."""
+    return MIN_RADIUS + max(params.rounds) * halfwidth
+
+
 def _nodes(window: Window, longest: int) -> tuple[int, int]:
     height, width = window[1] - window[0], window[3] - window[2]
     scale = longest / max(height, width)
@@ -268,3 +278,32 @@ def pixel_size(scene: Scene) -> float:
     """Of the median training camera at the origin, units."""
     cameras = [scene.cameras[i] for i in scene.indices("train")]
     return float(np.median([np.linalg.norm(c.centre) / c.K[0, 0] for c in cameras]))
+
+
+def recentre(radii: Array, alpha: NDArray[np.float32], blur: float) -> Array:
+    """How far the layers should move to lie around the opacity found, along the rays, from outside inwards.
+
+    With w_i = alpha_i prod_{k<i} (1 - alpha_k), the offset of a node is sum_i w_i (rho_i - middle) / sum_i w_i. It is
+    smoothed with sum_i w_i as the weight, so that transparent directions follow their neighbours and detail of the
+    start finer than `blur` is kept.
+
+    Args:
+        radii: (rows, columns, N).
+        alpha: (rows, columns, N) opacity at the same nodes.
+        blur: standard deviation of the smoothing, nodes.
+
+    Returns:
+        (rows, columns) to be added to the middle radius, units.
+    """
+    weights = (alpha * transmittance_before(alpha, -1)).astype(np.float64)
+    mass = weights.sum(-1)
+    middle = 0.5 * (radii[..., 0] + radii[..., -1])
+    moment = (weights * (radii - middle[..., None])).sum(-1)
+    moved = np.zeros_like(middle)
+    # From coarse to fine: where a scale holds less opacity than a tenth of a layer, the coarser one decides.
+    for scale in (16.0, 4.0, 1.0):
+        near = ndimage.gaussian_filter(mass, scale * blur, mode="nearest")
+        found = ndimage.gaussian_filter(moment, scale * blur, mode="nearest") / np.maximum(near, 1e-9)
+        trust = np.clip(near / 0.1, 0, 1)
+        moved = trust * found + (1 - trust) * moved
+    return moved

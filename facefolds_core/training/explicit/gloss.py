@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
+import torch
 from numpy.typing import NDArray
 
 from facefolds_core.facts import Fact, fact
@@ -38,7 +41,6 @@ class GlossFit:
 
     Args:
         poses: of a head that turns, in the frames of the training: the reflection of a ray is another one in each.
-        radii: (rows, columns) of the middle of the layers at nodes over the window, units.
         how: it is fitted.
         photographed: cameras of which there are photos, the first ones; others show no gloss. None: all.
     """
@@ -49,20 +51,25 @@ class GlossFit:
         window: Window,
         params: ReflectionParams,
         poses: Track | None,
-        radii: NDArray[np.float64],
         how: GlossParams = GLOSS,
         photographed: int | None = None,
     ) -> None:
         self._photographed = photographed
-        self.params, self.poses, self.how = params, poses, how
+        self.chart, self.window, self.params, self.poses, self.how = chart, window, params, poses, how
         self.on, self.smoother = params.enabled, 1.0
         self.maps: Maps | None = None
-        self._normals = surface_normals(radii, chart, window, map_shape(window, params.texels), how.normal_blur)
+        self._normals: NDArray[np.float32] | None = None
 
-    def follow(self, state: TextureState, source: Rays, pictures: CutOuts) -> None:
-        """New crossings: what the reflection adds to each ray."""
-        if self.maps is not None and self.poses is None:
-            self._shine(state, self.look(state, source, pictures))
+    def follow(self, state: TextureState, source: Rays, pictures: CutOuts, middle: torch.Tensor) -> None:
+        """New crossings, and perhaps a new middle radius: normals, and what the reflection adds to each ray."""
+        if not self.on:
+            return
+        radii, shape = middle.cpu().numpy().astype(np.float64), map_shape(self.window, self.params.texels)
+        self._normals = surface_normals(radii, self.chart, self.window, shape, self.how.normal_blur)
+        if self.maps is not None:
+            self.maps = replace(self.maps, surface=self._normals)
+            if self.poses is None:
+                self._shine(state, self.look(state, source, pictures))
 
     def light(self, state: TextureState, views: Views, frame: int) -> None:
         """Before a step on the rays of one frame: what the reflection adds to each, if they are others in each frame.
@@ -75,11 +82,12 @@ class GlossFit:
     def due(self, step: int, level: Level) -> bool:
         """Whether to fit after this step of a level: `fits` times, the last after its last one."""
         fits, steps = self.params.fits, level.iterations
-        return self.on and self.params.begin == "coarse" and (step + 1) * fits // steps > step * fits // steps
+        return self.on and self.params.begin == "rounds" and (step + 1) * fits // steps > step * fits // steps
 
-    def after(self, level: Level, state: TextureState, source: Rays, pictures: CutOuts) -> Fact | None:
-        """After a level: where it is time, whether there is one; with `begin: end` it is fitted now."""
-        if not self.on or not (level.coarse if self.params.begin == "coarse" else level.last):
+    def after(self, number: int, rounds: int, state: TextureState, source: Rays, pictures: CutOuts) -> Fact | None:
+        """After level `number`, of which `rounds` are of geometry: where it is time, whether there is one; with
+        `begin: end` it is fitted now."""
+        if not self.on or number != (rounds - 1 if self.params.begin == "rounds" else rounds + 1):
             return None
         seen = self.look(state, source, pictures)
         found = self._decide(state, seen)
@@ -98,6 +106,7 @@ class GlossFit:
         if not len(used.st):
             return  # nothing is opaque yet: a gloss of 0 would stay 0
         first = self.maps is None
+        assert self._normals is not None
         start = Maps.blank(self._normals, self.params) if first else self.maps
         assert start is not None
         rounds = self.how.first_rounds if first else self.how.rounds
@@ -110,6 +119,7 @@ class GlossFit:
     def _decide(self, state: TextureState, seen: Seen) -> Fact:
         """Whether the reflection helps on cameras that its fit did not see, or a smoother one does more: it is fitted
         anew then. If neither does there is none from here on."""
+        assert self._normals is not None
         start, used, least = Maps.blank(self._normals, self.params), self._used(seen), self.how.min_gain
         gain = smooth = gain_on_cameras(used, start, self.how)
         if gain < self.how.sure_gain:

@@ -1,4 +1,5 @@
-"""Training of the explicit model: textures coarse to fine on stored crossings. What was interrupted starts again."""
+"""Training of the explicit model: geometry in rounds at coarse textures, then textures coarse to fine on stored
+crossings. What was interrupted starts again."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The levels of a training of the explicit model: how fine, how long."""
+"""The levels of a training of the explicit model: how fine, how long, how thick."""
 
 from __future__ import annotations
 
@@ -11,20 +11,18 @@ import numpy as np
 from facefolds_core.params import ExplicitParams
 from facefolds_core.training.explicit.fit import Fit
 
-COARSE_STEPS = 60
-"""At a quarter of the final texels a side; then the reflection is judged. At most a third of all steps."""
-
 HALF_SHARE = 0.4
-"""Of the iterations after those, at half of the final texels a side; the others are at full resolution."""
+"""Of the iterations after the rounds of geometry, at half of the final texels a side; the others are at full
+resolution."""
 
 SETTLING = 0.6
 """From this part of the last level on, steps are compared over all colours at once, not over one each."""
 
-COARSE_STRIDE = 8
-"""At most every n-th pixel is looked at in the coarse steps."""
+ROUND_STRIDE = 8
+"""At most every n-th pixel is looked at in the rounds of geometry."""
 
-COARSE_RAYS = 250_000
-"""Rays of all cameras that are looked at in them, at least."""
+ROUND_RAYS = 250_000
+"""Rays of all cameras that are looked at in the rounds, at least."""
 
 
 @dataclass(frozen=True)
@@ -35,7 +33,7 @@ class Level:
         texels: (H, W).
         iterations: steps.
         stride: of the pixels that are traced.
-        coarse: the first one, on few pixels.
+        geometry: halfwidths of the layers, in those of the fit.
         last: the learning rates fall along it.
         pace: factor on all rates, and of steps between smoothings its inverse: below 1 where there are more steps than
             the way at full rate takes.
@@ -44,8 +42,8 @@ class Level:
     texels: tuple[int, int]
     iterations: int
     stride: int
-    coarse: bool = False
-    last: bool = False
+    geometry: float
+    last: bool
     pace: float = 1.0
 
     def smooths(self, step: int, every: int) -> bool:
@@ -66,7 +64,7 @@ def epochs(frames: int, random: np.random.Generator) -> Iterator[int]:
 
 
 def plan(fit: Fit, params: ExplicitParams, frames: int, pixels: int) -> list[Level]:
-    """A quarter, half and full resolution; the last two with their steps a frame.
+    """Rounds of geometry at a quarter of the resolution; half and full resolution, with their steps a frame.
 
     Args:
         frames: K.
@@ -79,18 +77,18 @@ def plan(fit: Fit, params: ExplicitParams, frames: int, pixels: int) -> list[Lev
     def size(divisor: int) -> tuple[int, int]:
         return max(16, fit.texels[0] // divisor), max(16, fit.texels[1] // divisor)
 
-    coarse, least = min(COARSE_STEPS, params.iterations // 3), params.textures.steps_per_frame * frames
-    rest = max(params.iterations - coarse, least)
-    pace = min(1.0, max(params.textures.full_rate_iterations - coarse, least) / rest)
+    geometry = params.geometry
+    stride = round_stride(pixels)
+    levels = [Level(size(4), geometry.round_iterations, stride, scale, False) for scale in geometry.rounds]
+    rounds, least = geometry.round_iterations * len(levels), params.textures.steps_per_frame * frames
+    rest = max(max(params.iterations, params.least_iterations) - rounds, least)
+    pace = min(1.0, max(params.textures.full_rate_iterations - rounds, least, 1) / rest)
     half = round(HALF_SHARE * rest)
-    return [
-        Level(size(4), max(1, coarse), coarse_stride(pixels), coarse=True),
-        Level(size(2), half, 1, pace=pace),
-        Level(fit.texels, max(rest - half, frames), 1, last=True, pace=pace),
-    ]
+    levels.append(Level(size(2), half, 1, geometry.rounds[-1], False, pace))
+    levels.append(Level(fit.texels, max(rest - half, frames), 1, geometry.rounds[-1], True, pace))
+    return levels
 
 
-def coarse_stride(pixels: int) -> int:
-    """Every so-manieth of `pixels` is looked at in the coarse steps: `COARSE_RAYS` of them at least, if there are as
-    many."""
-    return max(1, min(COARSE_STRIDE, pixels // COARSE_RAYS))
+def round_stride(pixels: int) -> int:
+    """Every so-manieth of `pixels` is looked at in the rounds: `ROUND_RAYS` of them at least, if there are as many."""
+    return max(1, min(ROUND_STRIDE, pixels // ROUND_RAYS))

@@ -93,11 +93,15 @@ class TextureState:
         self.texture = torch.empty(m, n, 4)
         self.gradient = torch.zeros(n, m, 4)
 
-    def fill(self, opacity: NDArray[np.float32], rgb: NDArray[np.float32]) -> None:
-        """Begin with this opacity (M, N) of the layers, and colours (M, N, 3) of their own."""
+    def fill(self, opacity: NDArray[np.float32], rgb: NDArray[np.float32] | None = None) -> None:
+        """Begin with this opacity (M, N) of the layers, and colours (M, N, 3) of their own; None keeps those that were
+        learnt, for layers that have moved."""
+        self.layers[1:] = 0
         self.layers[0, ..., 3] = _logits(opacity)
-        own = torch.from_numpy(rgb) - self.colour[0][:, None]
-        self.layers[0, ..., :3] = torch.where(torch.from_numpy(opacity)[..., None] > MIN_OPACITY, own, 0.0)
+        self.frame_alpha.zero_()
+        if rgb is not None:
+            own = torch.from_numpy(rgb) - self.colour[0][:, None]
+            self.layers[0, ..., :3] = torch.where(torch.from_numpy(opacity)[..., None] > MIN_OPACITY, own, 0.0)
 
     def fill_frame(self, frame: int, opacity: NDArray[np.float32]) -> None:
         """Begin one frame with an opacity (M, N) of its own."""

@@ -27,6 +27,8 @@ MAX_SHARE_OFF = 0.5
 """A mesh that is off in more than this share of the directions is left out."""
 NODES = 128
 """Rows and columns of (u, v) at which mesh and Gaussians are compared."""
+TRUST = 0.004
+"""The mesh is kept where the opacity found lies nearer than this, units; farther offsets lose as much."""
 OPACITY = 0.9
 """At the start, where only the mesh has a surface."""
 
@@ -73,7 +75,7 @@ def mesh_radii(vertices: Array, faces: NDArray[np.int32], chart: Chart, uv: Arra
     return np.where(count > 0, total / np.maximum(count, 1), np.nan).reshape(uv.shape[:-1])
 
 
-def blend(mesh: Array, volume: Array, reach: float | Array) -> Array:
+def blend(mesh: Array, volume: Array, reach: float | Array) -> tuple[Array, Array]:
     """Radii of the mesh where it is close to the volume, outside it or alone; of the volume elsewhere; a soft border.
 
     Args:
@@ -81,11 +83,13 @@ def blend(mesh: Array, volume: Array, reach: float | Array) -> Array:
         reach: where the volume lies outside the mesh by more, units, it is believed; one number or (rows, columns).
 
     Returns:
-        NaN where neither has one.
+        radii (NaN where neither has one), and the share of the mesh in them, 0 to 1.
     """
     close = np.isfinite(mesh) & ~(volume - mesh > reach)
     # Ten nodes inside the border the mesh rules alone.
     kept = np.clip(ndimage.distance_transform_edt(close) / 10, 0, 1)
     kept = np.where(np.isnan(volume), close.astype(np.float64), kept)
     filled = np.where(np.isnan(volume), mesh, volume)
-    return np.where(kept > 0, kept * np.where(close, mesh, 0) + (1 - kept) * np.where(kept < 1, filled, 0), filled)
+    return np.where(
+        kept > 0, kept * np.where(close, mesh, 0) + (1 - kept) * np.where(kept < 1, filled, 0), filled
+    ), kept

@@ -21,7 +21,7 @@ from facefolds_core.params import ExplicitParams
 from facefolds_core.subject.outline import texel_uv
 from facefolds_core.subject.volume import Volume
 from facefolds_core.training.explicit.cameras import CameraChoice
-from facefolds_core.training.explicit.fit import Fit, volume_in
+from facefolds_core.training.explicit.fit import Fit, least_middle, recentre, volume_in
 from facefolds_core.training.explicit.follow import follow, follow_rates
 from facefolds_core.training.explicit.gloss import GlossFit
 from facefolds_core.training.explicit.plan import SETTLING, Level, epochs
@@ -46,7 +46,7 @@ LAYER_ALPHA = 1 / 255
 
 
 class Trainer:
-    """A training under way: textures coarse to fine on stored crossings.
+    """A training under way: geometry in rounds at coarse textures, then textures coarse to fine on stored crossings.
 
     Attributes:
         layers: of both surfaces.
@@ -66,16 +66,24 @@ class Trainer:
         self.pictures, self.teacher = pictures, teacher
         self.random = np.random.default_rng(params.seed)
         self.layers = params.layers + (LAYERS if fit.second.any() else 0)
-        self.manifolds = _manifolds(fit, params.layers)
+        self.middle = torch.from_numpy(fit.middle).float()
+        self.geometry = 0.0
         self.views: Rays | None = None
         self.stride = 0
         self.state: TextureState | None = None
         self.iteration = self.rays = 0
         self.psnr = 0.0
         self.events = list(cameras.notes)
-        places = fit.chart, fit.window, params.reflection, self.scene.poses, fit.middle
-        self.gloss = GlossFit(*places, photographed=len(self.scene.indices("train")))
+        real = len(self.scene.indices("train"))
+        self.gloss = GlossFit(fit.chart, fit.window, params.reflection, cameras.scene.poses, photographed=real)
         self.usual = np.zeros((0, 3), np.float32)
+
+    def manifolds(self) -> RadialManifolds:
+        halfwidth, reach = (torch.from_numpy(part).float() for part in (self.fit.halfwidth, self.fit.reach))
+        halfwidth = self.geometry * halfwidth + reach
+        inner = (self.middle - halfwidth).numpy().astype(np.float64)
+        second = torch.from_numpy(second_layers(self.fit.second, inner)) if self.layers > self.params.layers else None
+        return RadialManifolds(self.fit.chart, self.fit.window, self.middle, halfwidth, self.params.layers, second)
 
     def run(self, level: Level, number: int, live: Live, bar: tqdm) -> None:
         """One level.
@@ -85,21 +93,25 @@ class Trainer:
         """
         self._prepare(level)
         self._step(level, number, live, bar)
-        self._judge_reflection(level, bar)
-        if not level.coarse:
+        self._judge_reflection(number, bar)
+        if number >= len(self.params.geometry.rounds):
             self._follow()
 
-    def _judge_reflection(self, level: Level, bar: tqdm) -> None:
+    def _judge_reflection(self, number: int, bar: tqdm) -> None:
         """After a level, where it is time: whether the reflection helps."""
         assert self.state is not None and self.views is not None
-        found = self.gloss.after(level, self.state, self.views, self.pictures)
+        rounds = len(self.params.geometry.rounds)
+        found = self.gloss.after(number, rounds, self.state, self.views, self.pictures)
         if found is not None:
             self.events.append(found)
             bar.write(f"train: {found}")
 
     def _prepare(self, level: Level) -> None:
-        """Stored crossings and grids of this level."""
-        new_rays = self.stride != level.stride
+        """Geometry, stored crossings and grids of this level."""
+        moved = self.geometry != level.geometry
+        if moved and self.state is not None:
+            self._recentre()
+        new_rays = moved or self.stride != level.stride
         if new_rays:
             self._trace(level)
         assert self.views is not None
@@ -108,28 +120,30 @@ class Trainer:
             self.state = self._new_state(level.texels)
         elif self.state.shape != level.texels:
             self.state.grow(level.texels)
-        self._begin_with_subject(begun)
+        self._begin_with_subject(begun or moved, colours=begun)
         if new_rays:
-            self.gloss.follow(self.state, self.views, self.pictures)
+            self.gloss.follow(self.state, self.views, self.pictures, self.middle)
 
     def _trace(self, level: Level) -> None:
         finest = level.texels if level.stride > 1 else self.fit.texels
         share = self.params.textures.rays_per_texel * finest[0] * finest[1]
-        self.stride = level.stride
-        self.views = rays_of(self.scene, self.manifolds, level.stride, share, self.params.moving, self.teacher.virtual)
+        self.geometry, self.stride = level.geometry, level.stride
+        self.views = rays_of(
+            self.scene, self.manifolds(), level.stride, share, self.params.moving, self.teacher.virtual
+        )
 
     def _new_state(self, texels: tuple[int, int]) -> TextureState:
         start = torch.from_numpy(self.fit.rgb).float()
         shape = (self.layers, self.scene.num_frames)
         return TextureState(texels, *shape, start, self.params)
 
-    def _begin_with_subject(self, fill: bool) -> None:
-        """Let the layers believe in the opacity of the subject's Gaussians; and begin with it, each frame with its own,
-        and with their colours."""
+    def _begin_with_subject(self, fill: bool, colours: bool) -> None:
+        """Let the layers believe in the opacity of the subject's Gaussians, and begin with it, each frame with its own;
+        with their colours."""
         assert self.state is not None
         shape = self.state.shape
         with on_one_thread():
-            nodes = self.manifolds.radii().detach().permute(2, 0, 1)[None]
+            nodes = self.manifolds().radii().detach().permute(2, 0, 1)[None]
             radii = torch.nn.functional.interpolate(nodes, size=shape, mode="bilinear", align_corners=False)
         places, uv = radii[0].permute(1, 2, 0).double().numpy(), texel_uv(self.fit.window, *shape)
         flat = shape[0] * shape[1], places.shape[-1]
@@ -141,18 +155,41 @@ class Trainer:
         opacity, rgb = held(self.fit.volume)
         self.state.believe(opacity)
         if fill:
-            self.state.fill(opacity, rgb)
+            self.state.fill(opacity, rgb if colours else None)
             for frame in range(self.scene.num_frames):
                 splats = self.teacher.moved(frame)
                 if splats is not None:
                     self.state.fill_frame(frame, held(volume_in(self.scene, splats))[0])
+
+    def _recentre(self) -> None:
+        """Move the middle radius to where this round found opacity, mean over frames."""
+        assert self.state is not None
+        h, w = self.state.shape
+        n = self.params.layers
+        frames = range(self.scene.num_frames)
+        alpha = torch.stack([self.state.activated(k)[:, :n, 3].clone() for k in frames]).mean(0)
+        seen = self.state.layers[2, :, :n, 3] > 0
+        alpha = torch.where(seen, alpha, 0.0).view(1, h, w, -1).permute(0, 3, 1, 2)
+        size = self.middle.shape[0], self.middle.shape[1]
+        with on_one_thread():
+            nodes = torch.nn.functional.interpolate(alpha, size=size, mode="bilinear", align_corners=False)
+        radii = self.manifolds().radii().detach().double().numpy()[..., :n]
+        offsets = recentre(radii, nodes[0].permute(1, 2, 0).numpy(), self.params.geometry.blur)
+        moved = self.middle + torch.from_numpy(offsets).float()
+        start = torch.from_numpy(self.fit.middle).float()
+        # Where hardly anything is opaque a direction may drift: not to c, where the search for crossings ends.
+        moved = start + _shrink(moved - start, torch.from_numpy(self.fit.trust).float())
+        self.middle = torch.maximum(
+            moved, torch.from_numpy(least_middle(self.fit.halfwidth, self.params.geometry) + self.fit.reach).float()
+        )
 
     def _step(self, level: Level, number: int, live: Live, bar: tqdm) -> None:
         """A level's iterations."""
         assert self.state is not None and self.views is not None
         stride, frames = self._stride(), epochs(self.scene.num_frames, self.random)
         self.state.pace = level.pace
-        min_alpha = 0.0 if level.coarse else MIN_ALPHA
+        coarse = number < len(self.params.geometry.rounds)
+        min_alpha = 0.0 if coarse else MIN_ALPHA
         best, recent = math.inf, math.nan
         for i, frame in zip(range(level.iterations), frames, strict=False):
             views, rays = self.views.part(frame, int(self.random.integers(stride)), stride)
@@ -163,7 +200,7 @@ class Trainer:
                 self.pictures.shuffle(self.random)
             rates = self._rates(level.pace, i / level.iterations if level.last else 0.0)
             error = self.state.step(views, rays, self.pictures, frame, min_alpha, rates)
-            if not level.coarse and level.smooths(i, self.params.textures.smooth_every):
+            if not coarse and level.smooths(i, self.params.textures.smooth_every):
                 self.state.smooth_alpha(frame)
             recent = error if i == 0 else (1 - SMOOTHING) * recent + SMOOTHING * error
             best = min(best, recent)
@@ -204,7 +241,7 @@ class Trainer:
         state.clear()
         above, below = self._kept_layers(state)
         first, last, stay = above[0], above[-1], [*above, *below]
-        radii = self.manifolds.radii().detach()
+        radii = self.manifolds().radii().detach()
         outer, inner = radii[..., first], radii[..., last]
         h, w = state.shape
         halfwidth = (0.5 * (outer - inner)).clamp(min=1e-6)
@@ -222,7 +259,7 @@ class Trainer:
             centre=self.fit.chart.centre,
             belt=self.fit.chart.belt,
             window=self.fit.window,
-            nodes=(radii.shape[0], radii.shape[1]),
+            nodes=(self.middle.shape[0], self.middle.shape[1]),
             texels=(h, w),
             num_layers=len(stay),
             num_frames=self.scene.num_frames,
@@ -247,7 +284,7 @@ class Trainer:
         """`fit.json`: what was chosen, and why."""
         return {
             "window": list(spec.window),
-            "middle_radius": {"least": float(self.fit.middle.min()), "greatest": float(self.fit.middle.max())},
+            "middle_radius": {"least": float(self.middle.min()), "greatest": float(self.middle.max())},
             "centre": list(spec.centre),
             "belt": None if spec.belt is None else spec.belt.degrees,
             "halfwidth": {"least": float(self.fit.halfwidth.min()), "greatest": float(self.fit.halfwidth.max())},
@@ -261,14 +298,6 @@ class Trainer:
         }
 
 
-def _manifolds(fit: Fit, layers: int) -> RadialManifolds:
-    """Both surfaces."""
-    halfwidth = fit.halfwidth + fit.reach
-    second = torch.from_numpy(second_layers(fit.second, fit.middle - halfwidth)) if fit.second.any() else None
-    middle, halfwidths = (torch.from_numpy(part).float() for part in (fit.middle, halfwidth))
-    return RadialManifolds(fit.chart, fit.window, middle, halfwidths, layers, second)
-
-
 def _diverged(number: int, level: Level, rate: float) -> UserError:
     return UserError(
         "training diverged",
@@ -276,3 +305,8 @@ def _diverged(number: int, level: Level, rate: float) -> UserError:
         expected="an error that falls",
         remedy="lower train.textures.learning_rate; if that does not help, check the capture's calibration",
     )
+
+
+def _shrink(values: torch.Tensor, by: torch.Tensor) -> torch.Tensor:
+    """Towards 0 by `by`, not beyond."""
+    return values.sign() * (values.abs() - by).clamp(min=0)
