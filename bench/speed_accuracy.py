@@ -30,7 +30,7 @@ from facefolds_core.training.report import device_name
 RESULTS = Path("bench/results/speed_accuracy.json")
 PICTURE = Path("docs/images/speed_accuracy.png")
 ITERATIONS = {
-    "fast": (123, 400, 940, 2340, 5000, 18000),
+    "fast": (183, 460, 1000, 2400, 5000, 18000),
     "quick": (100, 300, 600, 1200, 3000, 9000),
     "paper": (1, 2, 4, 8, 20, 60),
 }

@@ -82,7 +82,7 @@ MECHANISMS: dict[str, Off] = {
     "frames begin where the mesh has moved": Off(code={f"{TRAINING}.teacher:Teacher.moved": _nothing}),
     "views between the cameras": Off(code={"facefolds_core.subject.virtual:FEW": 0}),
     "layers begin as the Gaussians": Off(code={f"{TRAINING}.state:TextureState.fill": _nothing}),
-    "rounds of geometry": Off({"geometry": {"rounds": [1.0]}}),
+    "three rounds of geometry (one)": Off({"geometry": {"rounds": [1.0]}}),
     "opacity goes back to the Gaussians'": Off(code={f"{TRAINING}.state:BELIEF": 0.0}),
     "opacity is smoothed": Off({"textures": {"smooth_every": NEVER}}),
     "four rays at outlines": Off(code={f"{TRAINING}.views:SOFT": 256}),

@@ -25,7 +25,7 @@ class GridTextureParams(Section):
     learning_rate: Rate = 0.02
     """Of the colours shared by layers and frames; it falls along the last level. The other rates are factors on it."""
 
-    full_rate_iterations: Count = 400
+    full_rate_iterations: Count = 460
     """Of more `iterations` than these, the steps at half and full resolution are smaller in proportion, and smoothing
     is rarer: they go the same way more finely. At full rate four times as many lost 0.3 dB
     on cameras left out (`mugsy`, `studio`), since layers begin to show each camera its own picture."""
@@ -83,7 +83,7 @@ class ExplicitParams(Section):
     layers: Annotated[int, Field(ge=1, le=64)] = 12
     """Number of nested layers, N. Where cameras see beneath an overhang there are four more."""
 
-    iterations: Count = 240
+    iterations: Count = 300
     """Adam steps of rounds and textures together. More are made where `geometry` or `textures.steps_per_frame` need
     them."""
 

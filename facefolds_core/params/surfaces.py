@@ -53,7 +53,11 @@ class GeometryParams(Section):
     max_halfwidth: Length = 0.015
     """Largest distance of a layer from the middle, units."""
 
-    rounds: Annotated[Many[Annotated[float, Field(gt=0, le=100)]], Field(min_length=1, max_length=100)] = (1.6, 1.0)
+    rounds: Annotated[Many[Annotated[float, Field(gt=0, le=100)]], Field(min_length=1, max_length=100)] = (
+        2.5,
+        1.6,
+        1.0,
+    )
     """Halfwidths of the rounds of geometry, in halfwidths of the model."""
 
     round_iterations: Count = 60
