@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from facefolds_core.geometry.cameras import Camera
+from facefolds_core.subject.closed_form import closed_form
 from facefolds_core.subject.known_background import TINY, PlateParams, opacity_before
 
 Array = NDArray[np.float32]
@@ -41,9 +42,11 @@ class EdgeParams:
         grow: the silhouettes that vote are larger by so many, so that what GrabCut takes away once is not lost.
         share: of the pictures that see a Gaussian and take it for the subject's, at least.
         rounds: how often pictures and Gaussians tell each other.
-        soft: pixels on both sides of an outline in which opacity is not 0 or 1, at a picture of 384 pixels;
-        deep: and so many within it, where a pixel looks like what stands behind, as between locks of hair:
-        alike: where no channel differs by so much, of values in [0, 1], and what stands behind is known as well.
+        soft: pixels on both sides of an outline in which opacity is not 0 or 1, at a picture of 384 pixels; twice as
+            many where the Gaussians are neither opaque (`inside`) nor:
+        empty: of less opacity than this.
+        believed: what the colour of what stands behind says of a pixel's opacity weighs so much where it is known
+            exactly, beside the differences from its neighbours' in the closed form.
         beside: pixels beside the subject by which that is told, standard deviation, at a picture of 384 pixels.
         noise: largest deviation of what stands behind that is reckoned with, of values in [0, 1].
         asked: IoU of a silhouette with the Gaussians', under which the picture is asked once more, with those of the
@@ -58,8 +61,8 @@ class EdgeParams:
     share: float = 0.6
     rounds: int = 2
     soft: float = 4.0
-    deep: float = 12.0
-    alike: float = 0.05
+    empty: float = 0.1
+    believed: float = 10.0
     beside: float = 6.0
     noise: float = 0.1
     asked: float = 0.8
@@ -134,31 +137,27 @@ def _logarithmic(picture: Image) -> Image:
 
 
 def softened(picture: Image, cut: Bool, start: Array, behind: Array, camera: Camera, edge: EdgeParams) -> Array:
-    """(H, W) opacity in [0, 1] of the subject in a picture (H, W, 3): around its silhouette the geometric mean
-    of what the Gaussians say and of what the picture's colours say before what stands behind: both must say it. A dark
-    wall is known well, and opacity goes to 0 within a pixel; clutter that other cameras hardly see is not.
+    """(H, W) opacity in [0, 1] of the subject in a picture (H, W, 3): 1 and 0 away from its outline; along it by the
+    closed form of Levin et al. (2008, "A Closed-Form Solution to Natural Image Matting", eq. 12), where within
+    3 x 3 pixels colours lie on a line between the subject's and the room's. Where it is known what stands behind, what
+    `opacity_before` says of it is asked as well.
 
     Args:
         start: (H, W) opacity of its Gaussians.
         behind: (H, W, 3) what stands behind them.
     """
-    radius = pixels(edge.soft, camera)
-    near = grown(cut.astype(np.uint8), radius) > 0
-    if near.all() or not near.any():
+    outside, own, radius = (~cut).astype(np.uint8), cut.astype(np.uint8), pixels(edge.soft, camera)
+    inside = (grown(outside, 2 * radius) == 0) | ((grown(outside, radius) == 0) & (start >= edge.inside))
+    empty = (grown(own, 2 * radius) == 0) | ((grown(own, radius) == 0) & (start <= edge.empty))
+    if not inside.any() or not empty.any():
         return cut.astype(np.float32)
-    part, opacity = around(near, AROUND * radius), np.zeros(cut.shape, np.float32)
+    part, opacity = around(~empty, AROUND * radius), np.zeros(cut.shape, np.float32)
     colours, room = picture[part].astype(np.float32) / np.float32(255), np.clip(behind[part], 0, 1)
-    near, own = near[part], cut[part]
-    outside = (~own).astype(np.uint8)
-    inside, far = grown(outside, radius) == 0, grown(own.astype(np.uint8), 2 * radius) == 0
-    noise = _noise(colours, room, far, pixels(edge.beside, camera), radius, edge.noise)
-    asked = (noise < edge.alike) & (np.abs(colours - room).max(-1) < edge.alike)
-    inside &= ~asked | (grown(outside, pixels(edge.deep, camera)) == 0)
-    if not inside.any():
-        return cut.astype(np.float32)
-    found = opacity_before(colours, room, inside, near & ~inside, noise, PlateParams())
-    both = np.sqrt(found * np.clip(start[part], 0, 1))
-    opacity[part] = np.where(inside, np.float32(1), np.where(near, both, np.float32(0)))
+    noise = _noise(colours, room, grown(own[part], 2 * radius) == 0, pixels(edge.beside, camera), radius, edge.noise)
+    unknown = ~(inside | empty)[part]
+    before = opacity_before(colours, room, inside[part], unknown, noise, PlateParams())
+    believed = edge.believed * (PlateParams().noise / noise) ** 4
+    opacity[part] = closed_form(colours, inside[part], unknown, before, believed)
     return opacity
 
 
