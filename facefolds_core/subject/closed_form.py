@@ -17,7 +17,7 @@ LEAST = 1e-6
 
 
 def closed_form(colours: Array, inside: Bool, unknown: Bool, prior: Array, weight: Array) -> Array:
-    """(H, W) opacity in [0, 1]: the least of a^T L a + sum w (a - p)^2 over what is unknown, 1 on `inside`, 0 elsewhere.
+    """(H, W) opacity in [0, 1]: the least of a^T L a + sum w (a - p)^2 in what is unknown; 1 on `inside`, 0 elsewhere.
 
     Args:
         colours: (H, W, 3) in [0, 1].

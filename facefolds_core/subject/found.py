@@ -52,7 +52,12 @@ def reference_frame(scene: Scene) -> int:
 
 def subject_of(splats: Splats, scene: Scene) -> Bool:
     """(N,) whether a Gaussian is the subject's, of those of a whole scene."""
-    return _body(splats, near_enough(splats, scene), scene.radius or REACH)
+    return connected(splats, near_enough(splats, scene), scene)
+
+
+def connected(splats: Splats, possible: Bool, scene: Scene) -> Bool:
+    """(N,) the body among Gaussians that are possible."""
+    return _body(splats, possible, scene.radius or REACH)
 
 
 def joined(splats: Splats, scene: Scene) -> Bool:

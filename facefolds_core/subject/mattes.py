@@ -26,7 +26,7 @@ from facefolds_core.subject.cut_out import (
     softened,
 )
 from facefolds_core.subject.drawing import draw, view_of
-from facefolds_core.subject.found import background, belief, near_enough, opacity_of, reference_frame, subject_of
+from facefolds_core.subject.found import background, belief, connected, near_enough, opacity_of, reference_frame, subject_of
 from facefolds_core.subject.plates import Start, from_plate
 from facefolds_core.subject.splats import Splats
 from facefolds_core.subject.storage import Body
@@ -150,7 +150,8 @@ class Mattes:
 
 def body_among(scene: Scene, splats: Splats, frame: int, edge: EdgeParams | None = None) -> Body:
     """The body at the centre, as the training pictures of a frame agree on it: what the Gaussians say of each picture
-    is said to the pixel by its colours, and these silhouettes vote on the Gaussians."""
+    is said to the pixel by its colours, and these silhouettes vote on the Gaussians. What hangs behind the subject is
+    hidden by it from most cameras, which cannot vote against it: what stays must be connected."""
     edge = edge or EdgeParams()
     body, possible = Body(splats, subject_of(splats, scene), frame), near_enough(splats, scene)
     believed = belief(splats, scene, body.subject)
@@ -160,7 +161,7 @@ def body_among(scene: Scene, splats: Splats, frame: int, edge: EdgeParams | None
         for picture, start, camera in _pictures(scene, splats, frame, marks):
             cut = cut_out(picture, start, camera, colours, edge)
             larger.append((camera, grown(cut.astype(np.uint8), pixels(edge.grow, camera)) > 0))
-        body = Body(splats, possible & _voted(splats, larger, edge.share), frame)
+        body = Body(splats, connected(splats, possible & _voted(splats, larger, edge.share), scene), frame)
     return body
 
 
