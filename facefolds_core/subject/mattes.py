@@ -26,7 +26,15 @@ from facefolds_core.subject.cut_out import (
     softened,
 )
 from facefolds_core.subject.drawing import draw, view_of
-from facefolds_core.subject.found import background, belief, connected, near_enough, opacity_of, reference_frame, subject_of
+from facefolds_core.subject.found import (
+    background,
+    belief,
+    connected,
+    near_enough,
+    opacity_of,
+    reference_frame,
+    subject_of,
+)
 from facefolds_core.subject.plates import Start, from_plate
 from facefolds_core.subject.splats import Splats
 from facefolds_core.subject.storage import Body
