@@ -60,9 +60,9 @@ class EdgeParams:
     grow: float = 4.0
     share: float = 0.6
     rounds: int = 2
-    soft: float = 4.0
+    soft: float = 5.0
     empty: float = 0.1
-    believed: float = 10.0
+    believed: float = 1.0
     beside: float = 6.0
     noise: float = 0.1
     asked: float = 0.8
