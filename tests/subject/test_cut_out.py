@@ -224,7 +224,7 @@ def test_between_locks_one_sees_what_stands_behind() -> None:
     behind = np.full((384, 384, 3), 15 / 255, np.float32)
     start = np.where(head, 1, np.where(comb, 0.5, 0)).astype(np.float32)
     opacity = softened(image, cut, start, behind, look_at_origin("c", 0, 0, 384), EdgeParams())
-    beside = comb & (x > 316) & (x < 326) & (abs(y - 192) < 30)
+    beside = comb & (x > 321) & (x < 328) & (abs(y - 192) < 30)
     assert opacity[beside & ~locks].mean() < 0.6 * opacity[beside & locks].mean()
     assert opacity[head & (x < 180) & (np.hypot(x - 192, y - 192) < 60)].min() == 1
 
@@ -236,7 +236,7 @@ def test_what_is_guessed_to_stand_behind_takes_nothing_away() -> None:
     image, behind = np.full((384, 384, 3), 190, np.uint8), np.full((384, 384, 3), 190 / 255, np.float32)
     image[head], behind[np.hypot(x - 192, y - 192) < 104] = (60, 45, 38), np.array((60, 45, 38)) / 255
     opacity = softened(image, head, head.astype(np.float32), behind, look_at_origin("c", 0, 0, 384), EdgeParams())
-    assert opacity[np.hypot(x - 192, y - 192) < 95].min() == 1
+    assert opacity[np.hypot(x - 192, y - 192) < 95].min() > 0.999
     assert opacity[head].mean() > 0.97
 
 

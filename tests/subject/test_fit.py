@@ -18,11 +18,11 @@ from facefolds_core.subject.drawing import render
 from facefolds_core.subject.find import fit_room, pictures_of
 from facefolds_core.subject.fit import fit_pictures
 from facefolds_core.subject.foreign import moved, read_start
-from facefolds_core.subject.found import background, subject_of
+from facefolds_core.subject.found import background, near_enough, subject_of
 from facefolds_core.subject.gaussians import GaussianParams
 from facefolds_core.subject.mattes import Body, Mattes, body_among
 from facefolds_core.subject.ply import write_ply
-from facefolds_core.subject.splats import Splats
+from facefolds_core.subject.splats import MEAN, OPACITY, SCALE, Splats
 from facefolds_core.subject.sweep import depth_maps
 from tests.scenes import OPAQUE, first_hit, look_at_origin
 from tests.scenes import render as true_picture
@@ -115,6 +115,15 @@ def test_subject_mattes_and_what_stands_behind(scene: Scene, splats: Splats) -> 
     behind = background(splats, subject, scene.cameras[HELD])
     beside = ~true
     assert np.abs(behind - wall(scene.cameras[HELD]))[beside].mean() < 0.12
+
+
+def test_what_hangs_behind_the_subject_and_is_hidden_by_it_is_none_of_it(scene: Scene, splats: Splats) -> None:
+    """No picture shows it, so none votes against it; it is not connected."""
+    hidden = splats.values[:20].copy()
+    hidden[:, MEAN], hidden[:, SCALE], hidden[:, OPACITY] = (-0.42, 0, 0), np.log(0.01), 4
+    added = Splats(np.concatenate([splats.values, hidden]), splats.background)
+    assert near_enough(added, scene)[-20:].all()
+    assert not body_among(scene, added, 0).subject[-20:].any()
 
 
 @pytest.mark.parametrize(
