@@ -40,6 +40,7 @@ class PlateParams:
         solid: bonus, as a logarithm of likelihood, of an opacity of 1.
         believed: standard deviation of an opacity from what the subject's Gaussians say.
         steps: opacities from 0 to 1 that are compared.
+        weight: of the opacity that is expected so, beside the differences from its neighbours' in the closed form.
     """
 
     blur: float = 0.7
@@ -58,6 +59,7 @@ class PlateParams:
     solid: float = 2.0
     believed: float = 0.2
     steps: int = 21
+    weight: float = 1.0
 
 
 TINY = float(np.finfo(np.float32).eps)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from facefolds_core.subject.closed_form import closed_form
 from facefolds_core.subject.cut_out import grown
 from facefolds_core.subject.known_background import PlateParams, opacity_before
 
@@ -88,4 +89,6 @@ def _soft(image: Image, plate: Image, subject: Image, params: PlateParams, start
         inside &= ~same | (start.opacity > 0.5)
         inside |= same & (grown((start.opacity < SOLID).astype(np.uint8), DEEP) == 0)
     colours, room = (part.astype(np.float32) / np.float32(255) for part in (image, plate))
-    return opacity_before(colours, room, inside, unknown, noise, params, believed)
+    unknown &= ~inside
+    before = opacity_before(colours, room, inside, unknown, noise, params, believed)
+    return closed_form(colours, inside, unknown, before, np.full(before.shape, params.weight, np.float32))

@@ -89,7 +89,8 @@ def test_beside_a_plate_no_limit_is_too_low(given: dict[str, Any]) -> None:
     image = plate.copy()
     image[10:30, 10:30] = 0
     opacity = np.rint(255 * from_plate(image, plate, PlateParams(**given))) / 255
-    assert opacity[10:30, 10:30].min() == 1 and opacity[:, 31:].max() == 0
+    square = opacity[10:30, 10:30]
+    assert square.min() > 0.5 and square.mean() > 0.99 and opacity[:, 31:].max() == 0  # a corner is rounded
 
 
 def _before_a_post(hair: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
