@@ -98,6 +98,7 @@ $(READY): pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[dev]'
 	$(BIN)/facefolds doctor
+	$(BIN)/python -c 'import pymatting' # it compiles itself when it is first imported
 	@touch $(READY)
 
 blender: .venv-blender/.installed
