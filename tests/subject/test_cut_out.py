@@ -213,6 +213,20 @@ def test_opacity_ends_at_an_outline_before_a_wall_and_not_before_clutter() -> No
     assert 4 * beside(wall) < beside(clutter)
 
 
+def test_an_outline_before_clutter_is_sharp_though_gaussians_are_a_haze() -> None:
+    """And though what is said to stand behind is a guess: the picture's colours tell."""
+    rng, (y, x) = np.random.default_rng(4), np.mgrid[:384, :384]
+    away = np.hypot(x - 192, y - 192) - 100
+    head, haze = np.clip(0.5 - away, 0, 1), np.clip(0.5 - away / 16, 0, 1).astype(np.float32)
+    clutter = rng.integers(20, 236, (16, 16, 3)).repeat(24, 0).repeat(24, 1)
+    clutter[..., 0] //= 2  # nothing in it looks like skin
+    skin = np.array((215, 160, 130)) + rng.normal(0, 3, (384, 384, 3))
+    image = np.clip(head[..., None] * skin + (1 - head[..., None]) * clutter, 0, 255).astype(np.uint8)
+    behind = np.full((384, 384, 3), 0.4, np.float32)
+    opacity = softened(image, head > 0.5, haze, behind, look_at_origin("c", 0, 0, 384), EdgeParams())
+    assert np.abs(opacity - head)[np.abs(away) < 4].mean() < 0.05
+
+
 def test_between_locks_one_sees_what_stands_behind() -> None:
     """A silhouette is filled; its comb of hair is not, where the picture shows the wall."""
     y, x = np.mgrid[:384, :384]
