@@ -12,6 +12,7 @@ from scipy import ndimage
 
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.subject.closed_form import closed_form
+from facefolds_core.subject.found import DOUBT
 from facefolds_core.subject.known_background import TINY, PlateParams, opacity_before
 
 Array = NDArray[np.float32]
@@ -40,6 +41,7 @@ class EdgeParams:
         inside, outside: opacities of the Gaussians above and below which they are believed;
         band: and so many pixels off from where they are neither, at a picture of 384 pixels;
         grow: the silhouettes that vote are larger by so many, so that what GrabCut takes away once is not lost.
+        alike: where a picture differs by less from what stands behind, of values in [0, 1], Gaussians are doubted.
         share: of the pictures that see a Gaussian and take it for the subject's, at least.
         rounds: how often pictures and Gaussians tell each other.
         soft: pixels on both sides of an outline in which opacity is not 0 or 1, at a picture of 384 pixels; twice as
@@ -58,6 +60,7 @@ class EdgeParams:
     outside: float = 0.3
     band: float = 2.0
     grow: float = 4.0
+    alike: float = 0.02
     share: float = 0.6
     rounds: int = 2
     soft: float = 5.0
@@ -101,6 +104,17 @@ def colours_of(seen: Iterable[tuple[Image, Array, Camera]], edge: EdgeParams) ->
     models, known = np.zeros((2, 1, 65)), np.repeat(np.array(labels, np.uint8)[:, None], SAMPLES, 1)
     cv2.grabCut(np.stack(rows), known, (0, 0, 1, 1), models[0], models[1], 1, cv2.GC_INIT_WITH_MASK)
     return Colours(*models)
+
+
+def doubted(picture: Image, start: Array, behind: Array, camera: Camera, edge: EdgeParams) -> Array:
+    """(H, W) opacity of the subject's Gaussians, nowhere sure where a picture (H, W, 3) looks like what stands behind.
+
+    Args:
+        start: (H, W) as they say.
+        behind: (H, W, 3) what stands behind them.
+    """
+    differs = np.abs(picture.astype(np.float32) / 255 - np.clip(behind, 0, 1)).max(-1)
+    return np.where(_near(differs, pixels(edge.band, camera)) < edge.alike, np.minimum(start, DOUBT), start)
 
 
 def cut_out(picture: Image, start: Array, camera: Camera, colours: Colours | None, edge: EdgeParams) -> Bool:

@@ -34,15 +34,16 @@ SOLID = 0.3
 """Opacity from which on a Gaussian connects."""
 NEAR = 0.1
 """Standard deviation of the neighbourhood of the origin in which the body is the heaviest, units."""
-VIEWS = 3
-"""Training cameras that must have a Gaussian in their pictures, at least; all, where there are fewer."""
+VIEWS = 2
+"""Training cameras that must have a Gaussian in their pictures, at least; all, where there are fewer. Shoulders at the
+pictures' edges are in two."""
 SURROUNDING = 0.5
 """Length of the mean direction in which a body leaves the ball, below which it leaves it all around: a wall that
 surrounds the subject has 0, a neck and chest 0.8."""
 DIRECTIONS = 3
 """Directions are told apart by so many steps from the middle to each side."""
 DOUBT = 0.7
-"""Opacity as which a Gaussian counts that may be of the room: too little to be surely the subject's."""
+"""Opacity as which counts what may be of the room: too little to be surely the subject's."""
 
 
 def reference_frame(scene: Scene) -> int:

@@ -21,6 +21,7 @@ from facefolds_core.subject.cut_out import (
     agreement,
     colours_of,
     cut_out,
+    doubted,
     grown,
     pixels,
     softened,
@@ -158,15 +159,20 @@ class Mattes:
 
 def body_among(scene: Scene, splats: Splats, frame: int, edge: EdgeParams | None = None) -> Body:
     """The body at the centre, as the training pictures of a frame agree on it: what the Gaussians say of each picture
-    is said to the pixel by its colours, and these silhouettes vote on the Gaussians. What hangs behind the subject is
-    hidden by it from most cameras, which cannot vote against it: what stays must be connected."""
+    is said to the pixel by its colours, and these silhouettes vote on the Gaussians. Where a picture looks as it would
+    without them, they are not believed: before a plain wall some hang in the air, of its colour. What hangs behind the
+    subject is hidden by it from most cameras, which cannot vote against it: what stays must be connected."""
     edge = edge or EdgeParams()
     body, possible = Body(splats, subject_of(splats, scene), frame), near_enough(splats, scene)
     believed = belief(splats, scene, body.subject)
     for _ in range(edge.rounds):
         marks = np.where(believed > 0, believed, 1) * body.subject
-        colours, larger = colours_of(_pictures(scene, splats, frame, marks), edge), []
-        for picture, start, camera in _pictures(scene, splats, frame, marks):
+        seen = [
+            (picture, doubted(picture, start, background(splats, body.subject, camera), camera, edge), camera)
+            for picture, start, camera in _pictures(scene, splats, frame, marks)
+        ]
+        colours, larger = colours_of(seen, edge), []
+        for picture, start, camera in seen:
             cut = cut_out(picture, start, camera, colours, edge)
             larger.append((camera, grown(cut.astype(np.uint8), pixels(edge.grow, camera)) > 0))
         body = Body(splats, connected(splats, possible & _voted(splats, larger, edge.share), scene), frame)

@@ -22,7 +22,7 @@ from facefolds_core.subject.found import background, near_enough, subject_of
 from facefolds_core.subject.gaussians import GaussianParams
 from facefolds_core.subject.mattes import Body, Mattes, body_among
 from facefolds_core.subject.ply import write_ply
-from facefolds_core.subject.splats import MEAN, OPACITY, SCALE, Splats
+from facefolds_core.subject.splats import COLOUR, COLUMNS, MEAN, OPACITY, SCALE, Splats
 from facefolds_core.subject.sweep import depth_maps
 from tests.scenes import OPAQUE, first_hit, look_at_origin
 from tests.scenes import render as true_picture
@@ -124,6 +124,29 @@ def test_what_hangs_behind_the_subject_and_is_hidden_by_it_is_none_of_it(scene: 
     added = Splats(np.concatenate([splats.values, hidden]), splats.background)
     assert near_enough(added, scene)[-20:].all()
     assert not body_among(scene, added, 0).subject[-20:].any()
+
+
+def test_what_hangs_before_a_plain_wall_in_its_colour_is_none_of_the_subject(tmp_path: Path) -> None:
+    """Every picture looks the same without it. What differs from the wall stays."""
+    rig = tuple(look_at_origin(f"c{i}", azimuth, 0, 96) for i, azimuth in enumerate((-30, -10, 10, 30)))
+    random = np.random.default_rng(0)
+    wall, head, beside = random.uniform(-1.5, 1.5, (900, 3)), random.normal(0, 0.06, (300, 3)), np.zeros((12, 3))
+    wall[:, 0], beside[:, 1] = -1, np.linspace(0.15, 0.37, 12)
+    values = np.zeros((1212, COLUMNS), np.float32)
+    values[:, MEAN] = np.concatenate([wall, head, beside])
+    values[:, SCALE] = np.log(np.repeat([0.08, 0.03, 0.05], [900, 300, 12]))[:, None]
+    values[:, 6], values[:, OPACITY] = 1, 4
+    values[:, COLOUR] = np.repeat([[0.7, 0.7, 0.7], [0.6, 0.2, 0.1], [0.7, 0.7, 0.7]], [900, 300, 12], 0)
+    splats, true = Splats(values, np.full(3, 0.7, np.float32)), Splats(values[:1200], np.full(3, 0.7, np.float32))
+    scene = Scene(
+        "s", rig, ("train",) * 4, ("0",), np.zeros(1), 0.0, Similarity(1, np.eye(3), np.zeros(3)), (), tmp_path
+    )
+    pictures = (np.rint(255 * np.clip(render(true, camera)[0], 0, 1)).astype(np.uint8) for camera in rig)
+    write_frames(tmp_path / "frames.arrow", (96, 96, 3), ((i, 0, one) for i, one in enumerate(pictures)))
+    assert subject_of(splats, scene)[-12:].all()
+    body = body_among(scene, splats, 0).subject
+    assert body[900:1200].mean() > 0.9
+    assert not body[-6:].any()
 
 
 @pytest.mark.parametrize(
