@@ -119,7 +119,7 @@ def doubted(picture: Image, start: Array, behind: Array, camera: Camera, edge: E
 
 def cut_out(picture: Image, start: Array, camera: Camera, colours: Colours | None, edge: EdgeParams) -> Bool:
     """(H, W) silhouette of the subject in a picture (H, W, 3): GrabCut (Rother et al. 2004) between what is surely its
-    and surely not.
+    and surely not. Holes are filled where Gaussians are: through glasses one sees the room.
 
     Args:
         start: (H, W) opacity of its Gaussians.
@@ -135,7 +135,7 @@ def cut_out(picture: Image, start: Array, camera: Camera, colours: Colours | Non
         cv2.grabCut(_logarithmic(picture[part]), own, (0, 0, 1, 1), *models, 1, cv2.GC_EVAL_FREEZE_MODEL)
         cut = np.zeros_like(cut)
         cut[part] = (own == cv2.GC_FGD) | (own == cv2.GC_PR_FGD)
-    return np.asarray(ndimage.binary_fill_holes(cut))
+    return np.asarray(cut | (ndimage.binary_fill_holes(cut) & (start > 0.5)))
 
 
 def _sure(start: Array, camera: Camera, edge: EdgeParams) -> tuple[Bool, Bool]:

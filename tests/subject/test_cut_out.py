@@ -41,6 +41,20 @@ def test_of_a_lamp_of_the_subjects_colour_only_what_is_near_the_volume_is_cut_ou
     assert found[away < 28].all() and not found[away > 33].any()
 
 
+def test_through_glasses_one_sees_the_room_and_a_bite_is_mended() -> None:
+    """Two holes of the room's colour in a disc: Gaussians are in one of them alone."""
+    rng, (y, x) = np.random.default_rng(4), np.mgrid[:96, :96]
+    disc, glass, bite = np.hypot(x - 48, y - 48) < 40, np.hypot(x - 34, y - 48) < 9, np.hypot(x - 64, y - 48) < 3
+    shown = disc & ~glass & ~bite
+    image = (np.where(shown[..., None], (200, 150, 120), (40, 60, 90)) + rng.integers(-8, 9, (96, 96, 3))).astype(
+        np.uint8
+    )
+    rough = np.where(disc & ~glass, np.where(np.hypot(x - 64, y - 48) < 6, 0.8, 1), 0).astype(np.float32)
+    found = cut(image, rough)
+    assert found[bite].all()
+    assert not found[glass].any()
+
+
 def test_a_picture_that_is_all_subject_or_all_room_is_left_alone() -> None:
     image = np.zeros((16, 16, 3), np.uint8)
     assert cut(image, np.ones((16, 16), np.float32)).all()
