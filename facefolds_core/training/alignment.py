@@ -42,11 +42,13 @@ class Points:
     Attributes:
         positions, normals: (P, 3), in the world.
         pixels: (P, 2) x, y.
+        weight: (P,) how much each counts.
     """
 
     positions: Array
     normals: Array
     pixels: Array
+    weight: Array
 
 
 def features(image: NDArray[np.uint8], sigma: float) -> Picture:
@@ -103,7 +105,7 @@ class Equations:
         middle: (3,) that turns are about.
         slopes: (P, 6) of the residuals in turn and shift; depth: (P,) in a move of the points along their rays.
         residual, value: (P,) difference from the reference, and what the frame shows.
-        weight: (P,) Cauchy's.
+        weight: (P,) Cauchy's, times the points' own.
     """
 
     middle: Array
@@ -124,9 +126,9 @@ class Equations:
     ) -> Equations:
         middle = pose.apply(np.concatenate([one.positions for one in points]).mean(0))
         rows = [_rows(pose, middle, *one) for one in zip(cameras, points, shown, seen, strict=True)]
-        slopes, depth, residual, value = (np.concatenate(parts) for parts in zip(*rows, strict=True))
+        slopes, depth, residual, value, own = (np.concatenate(parts) for parts in zip(*rows, strict=True))
         typical = float(np.median(np.abs(residual))) if len(residual) else 0.0
-        weight = 1 / (1 + (residual / (OUTLIER * typical + 1e-9)) ** 2)
+        weight = own / (1 + (residual / (OUTLIER * typical + 1e-9)) ** 2)
         return cls(middle, slopes, depth, residual, value, weight)
 
     def normal(self) -> Array:
@@ -150,8 +152,8 @@ def _rows(
     points: Points,
     shown: Picture,
     seen: Array,
-) -> tuple[Array, Array, Array, Array]:
-    """Slopes (P, 6), depth, residual and value (P,) of the points that this camera sees."""
+) -> tuple[Array, Array, Array, Array, Array]:
+    """Slopes (P, 6), depth, residual, value and weight (P,) of the points that this camera sees."""
     use, pixels, there = _visible(pose, camera, points)
     depth = camera.project(there)[1]
     values = look_up(shown, pixels)
@@ -162,7 +164,7 @@ def _rows(
     slope = np.stack([gx, gy, -(gx * centred[:, 0] + gy * centred[:, 1])], -1) @ camera.rotation
     along = unit(points.positions[use] - camera.centre) @ pose.rotation.T
     slopes = np.concatenate([np.cross(there - middle, slope), slope], 1)
-    return slopes, (slope * along).sum(1), values[:, 0] - seen[use], values[:, 0]
+    return slopes, (slope * along).sum(1), values[:, 0] - seen[use], values[:, 0], points.weight[use]
 
 
 def unit(vectors: Array) -> Array:

@@ -5,7 +5,8 @@ surface, with what each camera saw there. A pose of another frame moves the poin
 picture of that frame they should look alike. The six numbers of a frame follow by Gauss-Newton from coarse to fine,
 started from where its neighbour's motion leads; then one number more, how deep the points lie behind what the volume
 says, follows from all frames together. Pictures are compared after local normalisation, with Cauchy's
-weights: light that is fixed to the room, and a face that performs, count little.
+weights: light that is fixed to the room, and a face that performs, count little. So do points far from the cameras'
+common centre: shoulders stand still while a head turns, and what is wanted is the head's pose.
 """
 
 from __future__ import annotations
@@ -54,6 +55,9 @@ MAX_DEEPER = 0.01
 MIN_OPACITY = 0.9
 """Least opacity of the volume on a ray that gives a point."""
 
+HEAD = 0.25
+"""Share of the points that are nearer to the cameras' common centre than one standard deviation of their weight."""
+
 MIN_LIKENESS = 0.6
 """A frame is refused, and its pose bridged, if it correlates with the reference less than this share of the median
 frame."""
@@ -89,7 +93,7 @@ def find_track(scene: Scene) -> Found:
     subject, mattes = find_subject(scene, SubjectParams())
     volume, reference = volume_of(subject.splats), reference_frame(scene)
     cameras = [scene.cameras[i] for i in scene.indices("train")]
-    points = [surface_points(volume, camera) for camera in cameras]
+    points = centred([surface_points(volume, camera) for camera in cameras])
     frames = scene.num_frames
     with progress(total=frames * (1 + ROUNDS) - 1, desc="poses", unit="frame") as bar:
         poses, likeness = _all_frames(scene, cameras, points, reference, bar)
@@ -123,7 +127,14 @@ def surface_points(volume: Volume, camera: Camera) -> Points:
     solid = (alpha > MIN_OPACITY) & (depth > 0)
     solid = cv2.erode(solid.astype(np.uint8), np.ones((3, 3), np.uint8), borderValue=0) > 0
     kept = solid & (-(normals * directions).sum(-1) > MIN_COSINE)
-    return Points(there[kept], normals[kept], pixels[kept])
+    return Points(there[kept], normals[kept], pixels[kept], np.ones(int(kept.sum())))
+
+
+def centred(points: Sequence[Points]) -> list[Points]:
+    """The points of all cameras, weighted by a normal distribution about the cameras' common centre."""
+    far = [np.linalg.norm(one.positions, axis=1) for one in points]
+    width = float(np.quantile(np.concatenate(far), HEAD)) if sum(map(len, far)) else 1.0
+    return [replace(one, weight=np.exp(-0.5 * (r / width) ** 2)) for one, r in zip(points, far, strict=True)]
 
 
 @dataclass(frozen=True)

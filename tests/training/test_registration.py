@@ -33,23 +33,49 @@ def points_of(camera_index: int, cameras: list[Camera]) -> Points:
     distance, hit = first_hit(origins, directions, OPAQUE[0].radius)
     there = (origins + distance[..., None] * directions)[hit]
     normals = (there - CENTRE) / OPAQUE[0].radius
-    return Points(there, normals, pixels[hit])
+    return Points(there, normals, pixels[hit], np.ones(int(hit.sum())))
 
 
-def test_a_turn_and_a_shift_are_found() -> None:
+def turn_found(still: int = 0, weight: float = 1.0) -> tuple[float, float, float]:
+    """Degrees and units that a pose of TRACK is off, and likeness; so many of four cameras show what does not move, and
+    count so much."""
     cameras = [look_at_origin(str(i), azimuth, 10 * (-1) ** i, SIZE) for i, azimuth in enumerate((-40, -10, 20, 45))]
     points = [points_of(i, cameras) for i in range(4)]
-    pose = Similarity.identity()
+    points[:still] = [replace(one, weight=weight * one.weight) for one in points[:still]]
+    pose, likeness = Similarity.identity(), 0.0
     for sigma in (4.0, 1.5):
         first = [features(np.round(255 * render(c, OPAQUE, 0)[0]).astype(np.uint8), sigma) for c in cameras]
-        moved = [TRACK.camera(c, 1) for c in cameras]
+        moved = [c if i < still else TRACK.camera(c, 1) for i, c in enumerate(cameras)]
         shown = [features(np.round(255 * render(c, OPAQUE, 0)[0]).astype(np.uint8), sigma) for c in moved]
         seen = [look_up(a, p.pixels)[:, 0] for a, p in zip(first, points, strict=True)]
         pose, likeness = refined(pose, cameras, points, shown, seen)
     off = TRACK.at(1).inverse().after(pose)
+    degrees = float(Track.of([off.rotation], [off.translation]).degrees()[0])
+    return degrees, float(np.linalg.norm(off.apply(np.zeros(3)))), likeness
+
+
+def test_a_turn_and_a_shift_are_found() -> None:
+    degrees, shift, likeness = turn_found()
     assert likeness > 0.95
-    assert Track.of([off.rotation], [off.translation]).degrees()[0] < 0.5  # of 5; seen 0.34
-    assert np.linalg.norm(off.apply(np.zeros(3))) < 0.003  # of 0.024; seen 0.001
+    assert degrees < 0.5  # of 5; seen 0.34
+    assert shift < 0.003  # of 0.024; seen 0.001
+
+
+def test_shoulders_that_stand_still_do_not_hold_the_head() -> None:
+    """Points far from the cameras' centre count little."""
+    assert turn_found(still=2)[0] > 2
+    assert turn_found(still=2, weight=0.01)[0] < 0.8
+
+
+def test_points_count_by_their_distance_from_the_cameras_centre() -> None:
+    random = np.random.default_rng(0)
+    clouds = [random.normal(0, width, (500, 3)) for width in (1.0, 3.0)]
+    found = registration.centred([Points(one, one, one[:, :2], np.ones(500)) for one in clouds])
+    assert (np.concatenate([one.weight for one in found]) > np.exp(-0.5)).mean() == pytest.approx(0.25)
+    for one, cloud in zip(found, clouds, strict=True):
+        assert (np.argsort(-one.weight) == np.argsort(np.linalg.norm(cloud, axis=1))).all()
+    (empty,) = registration.centred([Points(*np.zeros((3, 0, 3)), np.ones(0))])
+    assert len(empty.weight) == 0
 
 
 def test_a_frame_that_leaps_is_refused_and_bridged() -> None:
