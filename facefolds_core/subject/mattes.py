@@ -104,7 +104,8 @@ class Mattes:
             return Matte(self._given.image(*key)[..., 0], "capture")
         picture = self._frames.image(*key)
         if self._plates is not None and (key[0], 0) in self._plates:
-            return Matte(_bytes(from_plate(picture, self._plates.image(key[0], 0), start=self._start(key))), "plate")
+            plate, opacity = self._plates.image(key[0], 0), None if self.alone is None else self._alone_in(key)
+            return Matte(_bytes(from_plate(picture, plate, start=self._start(key), opacity=opacity)), "plate")
         assert self.body is not None
         camera, (start, behind) = self.scene.camera_in_head(*key), self._seen(key)
         colours = self._colours

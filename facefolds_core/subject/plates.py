@@ -44,25 +44,34 @@ class Start:
         return np.asarray(np.exp(-0.5 * np.square(np.abs(one - two).max(-1) / (SAME * noise))), np.float32)
 
 
-def from_plate(image: Image, plate: Image, params: PlateParams | None = None, start: Start | None = None) -> Array:
+def from_plate(
+    image: Image,
+    plate: Image,
+    params: PlateParams | None = None,
+    start: Start | None = None,
+    opacity: Array | None = None,
+) -> Array:
     """(H, W) opacity of the subject in [0, 1].
 
     Args:
         image, plate: (H, W, 3).
-        start: what the subject's Gaussians say, once they are known.
+        start: what the subject's Gaussians say, once they are known, of a head that stands still.
+        opacity: (H, W) theirs in this picture, once they are known.
     """
     params = params or PlateParams()
-    subject = _different(image, plate, params)
+    subject = _different(image, plate, params, opacity)
     return _soft(image, plate, subject, params, start) if subject.any() else subject.astype(np.float32)
 
 
-def _different(image: Image, plate: Image, params: PlateParams) -> Image:
-    """(H, W) 1 where picture and plate differ, without holes and small things."""
+def _different(image: Image, plate: Image, params: PlateParams, opacity: Array | None) -> Image:
+    """(H, W) 1 where picture and plate differ, without small things, and without holes but where no Gaussians are:
+    through glasses one sees the room."""
     one, two = (cv2.GaussianBlur(part.astype(np.float32), (0, 0), params.blur) / 255 for part in (image, plate))
     difference = np.abs(one - two).max(-1)
     # Beyond the picture's border what is cut off goes on: else closing would gnaw at it.
     found = ndimage.binary_closing(np.pad(difference > params.different, 2, mode="edge"), iterations=2)[2:-2, 2:-2]
-    labels, count = ndimage.label(ndimage.binary_fill_holes(found))
+    filled = ndimage.binary_fill_holes(found)
+    labels, count = ndimage.label(filled if opacity is None else found | (filled & (opacity > 0.5)))
     sizes = np.bincount(labels.ravel(), minlength=count + 1)
     kept = sizes >= params.least * sizes[1:].max(initial=0)
     kept[0] = False

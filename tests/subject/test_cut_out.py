@@ -180,6 +180,17 @@ def test_shadows_and_holes_beside_a_plate_are_none() -> None:
     assert (found & disc).sum() / (found | disc).sum() > 0.97
 
 
+def test_through_glasses_one_sees_the_plate_where_no_gaussians_are() -> None:
+    """A hole of the plate's colour is filled, until Gaussians say that nothing is there."""
+    y, x = np.mgrid[:64, :64]
+    disc, hole = np.hypot(x - 32, y - 32) < 26, np.hypot(x - 32, y - 32) < 10
+    image, plate = _before_a_plate((disc & ~hole).astype(float))
+    middle = np.hypot(x - 32, y - 32) < 5
+    for opacity, found in ((None, 1.0), (disc, 1.0), (disc & ~hole, 0.0)):
+        said = None if opacity is None else opacity.astype(np.float32)
+        np.testing.assert_allclose(from_plate(image, plate, opacity=said)[middle], found, atol=0.05)
+
+
 def test_a_picture_of_the_empty_room_has_no_subject() -> None:
     assert not from_plate(*_before_a_plate(np.zeros((32, 32))), PlateParams()).any()
 
