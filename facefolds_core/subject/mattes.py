@@ -104,8 +104,7 @@ class Mattes:
             return Matte(self._given.image(*key)[..., 0], "capture")
         picture = self._frames.image(*key)
         if self._plates is not None and (key[0], 0) in self._plates:
-            plate, opacity = self._plates.image(key[0], 0), None if self.alone is None else self._alone_in(key)
-            return Matte(_bytes(from_plate(picture, plate, start=self._start(key), opacity=opacity)), "plate")
+            return Matte(_bytes(from_plate(picture, self._plates.image(key[0], 0), start=self._start(key))), "plate")
         assert self.body is not None
         camera, (start, behind) = self.scene.camera_in_head(*key), self._seen(key)
         colours = self._colours
@@ -127,11 +126,12 @@ class Mattes:
         return colours_of(_pictures(self.scene, body.splats, body.frame, body.subject), self.edge)
 
     def _start(self, key: Key) -> Start | None:
-        """What Gaussians say beside a plate: of a head that stands still, once they are known."""
-        first = key[0], reference_frame(self.scene)
-        if self.alone is None or self.scene.poses is not None or first not in self._frames:
+        """What Gaussians say beside a plate, once they are known."""
+        if self.alone is None:
             return None
-        return Start(self._frames.image(*first), self._alone_in(key))
+        first = key[0], reference_frame(self.scene)
+        still = self.scene.poses is None and first in self._frames
+        return Start(self._alone_in(key), self._frames.image(*first) if still else None)
 
     def _alone_in(self, key: Key) -> Array:
         """(H, W) opacity of the Gaussians that were trained with the subject cut out."""

@@ -29,37 +29,31 @@ class Start:
     """What the subject's Gaussians say of a camera. Hair before a shelf of its colour does not differ from the plate.
 
     Attributes:
-        image: (H, W, 3) the camera's picture in the frame in which they were fitted.
         opacity: (H, W) theirs.
+        image: (H, W, 3) the camera's picture in the frame in which they were fitted; None of a head that turns.
     """
 
-    image: Image
     opacity: Array
+    image: Image | None = None
 
     def believed(self, image: Image, noise: float, params: PlateParams) -> Array:
         """(H, W) in [0, 1] whether a picture looks as theirs does."""
+        assert self.image is not None
         one, two = (
             cv2.GaussianBlur(part.astype(np.float32), (0, 0), params.beside) / 255 for part in (image, self.image)
         )
         return np.asarray(np.exp(-0.5 * np.square(np.abs(one - two).max(-1) / (SAME * noise))), np.float32)
 
 
-def from_plate(
-    image: Image,
-    plate: Image,
-    params: PlateParams | None = None,
-    start: Start | None = None,
-    opacity: Array | None = None,
-) -> Array:
+def from_plate(image: Image, plate: Image, params: PlateParams | None = None, start: Start | None = None) -> Array:
     """(H, W) opacity of the subject in [0, 1].
 
     Args:
         image, plate: (H, W, 3).
-        start: what the subject's Gaussians say, once they are known, of a head that stands still.
-        opacity: (H, W) theirs in this picture, once they are known.
+        start: what the subject's Gaussians say, once they are known.
     """
     params = params or PlateParams()
-    subject = _different(image, plate, params, opacity)
+    subject = _different(image, plate, params, None if start is None else start.opacity)
     return _soft(image, plate, subject, params, start) if subject.any() else subject.astype(np.float32)
 
 
@@ -91,7 +85,7 @@ def _soft(image: Image, plate: Image, subject: Image, params: PlateParams, start
     unknown = (subject > 0) | (differs & (grown(subject, params.beyond) > 0))
     noise = max(params.noise, noise)
     believed = None
-    if start is not None:
+    if start is not None and start.image is not None:
         believed = start.opacity, start.believed(image, noise, params)
         same = believed[1] > 0.5
         unknown |= (start.opacity > FAINT) & (believed[1] > FAINT)
