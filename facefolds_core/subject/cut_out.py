@@ -41,7 +41,8 @@ class EdgeParams:
         inside, outside: opacities of the Gaussians above and below which they are believed;
         band: and so many pixels off from where they are neither, at a picture of 384 pixels;
         grow: the silhouettes that vote are larger by so many, so that what GrabCut takes away once is not lost.
-        alike: where a picture differs by less from what stands behind, of values in [0, 1], Gaussians are doubted.
+        alike: where a picture, blurred by `band`, differs by less from what stands behind, of values in [0, 1],
+            Gaussians are not sure (`inside`) when it votes.
         share: of the pictures that see a Gaussian and take it for the subject's, at least.
         rounds: how often pictures and Gaussians tell each other.
         soft: pixels on both sides of an outline in which opacity is not 0 or 1, at a picture of 384 pixels; twice as
@@ -113,13 +114,13 @@ def doubted(picture: Image, start: Array, behind: Array, camera: Camera, edge: E
         start: (H, W) as they say.
         behind: (H, W, 3) what stands behind them.
     """
-    differs = np.abs(picture.astype(np.float32) / 255 - np.clip(behind, 0, 1)).max(-1)
-    return np.where(_near(differs, pixels(edge.band, camera)) < edge.alike, np.minimum(start, DOUBT), start)
+    differs = _near((picture / 255 - np.clip(behind, 0, 1)).astype(np.float32), pixels(edge.band, camera))
+    return np.where(np.abs(differs).max(-1) < edge.alike, np.minimum(start, DOUBT), start)
 
 
 def cut_out(picture: Image, start: Array, camera: Camera, colours: Colours | None, edge: EdgeParams) -> Bool:
     """(H, W) silhouette of the subject in a picture (H, W, 3): GrabCut (Rother et al. 2004) between what is surely its
-    and surely not. Holes are filled where Gaussians are: through glasses one sees the room.
+    and surely not, without holes.
 
     Args:
         start: (H, W) opacity of its Gaussians.
@@ -135,7 +136,20 @@ def cut_out(picture: Image, start: Array, camera: Camera, colours: Colours | Non
         cv2.grabCut(_logarithmic(picture[part]), own, (0, 0, 1, 1), *models, 1, cv2.GC_EVAL_FREEZE_MODEL)
         cut = np.zeros_like(cut)
         cut[part] = (own == cv2.GC_FGD) | (own == cv2.GC_PR_FGD)
-    return np.asarray(cut | (ndimage.binary_fill_holes(cut) & (start > 0.5)))
+    return filled(cut, start)
+
+
+def filled(cut: Bool, opacity: Array | None) -> Bool:
+    """(H, W) a silhouette without holes, but for those that its Gaussians have, too: through glasses one sees the room.
+
+    Args:
+        opacity: (H, W) of the Gaussians, once they are known.
+    """
+    whole = np.asarray(ndimage.binary_fill_holes(cut))
+    if opacity is None:
+        return whole
+    solid = opacity > 0.5
+    return np.asarray(cut | (whole & ~(ndimage.binary_fill_holes(solid) & ~solid)))
 
 
 def _sure(start: Array, camera: Camera, edge: EdgeParams) -> tuple[Bool, Bool]:

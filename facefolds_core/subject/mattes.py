@@ -127,10 +127,9 @@ class Mattes:
 
     def _start(self, key: Key) -> Start | None:
         """What Gaussians say beside a plate, once they are known."""
-        if self.alone is None:
+        first, still = (key[0], reference_frame(self.scene)), self.scene.poses is None
+        if self.alone is None or (still and first not in self._frames):
             return None
-        first = key[0], reference_frame(self.scene)
-        still = self.scene.poses is None and first in self._frames
         return Start(self._alone_in(key), self._frames.image(*first) if still else None)
 
     def _alone_in(self, key: Key) -> Array:

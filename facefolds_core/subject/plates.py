@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from facefolds_core.subject.closed_form import closed_form
-from facefolds_core.subject.cut_out import grown
+from facefolds_core.subject.cut_out import filled, grown
 from facefolds_core.subject.known_background import PlateParams, opacity_before
 
 Array = NDArray[np.float32]
@@ -26,7 +26,7 @@ SAME = 3.0
 
 @dataclass(frozen=True)
 class Start:
-    """What the subject's Gaussians say of a camera. Hair before a shelf of its colour does not differ from the plate.
+    """What the subject's Gaussians say of a picture. Hair before a shelf of its colour does not differ from the plate.
 
     Attributes:
         opacity: (H, W) theirs.
@@ -64,8 +64,7 @@ def _different(image: Image, plate: Image, params: PlateParams, opacity: Array |
     difference = np.abs(one - two).max(-1)
     # Beyond the picture's border what is cut off goes on: else closing would gnaw at it.
     found = ndimage.binary_closing(np.pad(difference > params.different, 2, mode="edge"), iterations=2)[2:-2, 2:-2]
-    filled = ndimage.binary_fill_holes(found)
-    labels, count = ndimage.label(filled if opacity is None else found | (filled & (opacity > 0.5)))
+    labels, count = ndimage.label(filled(found, opacity))
     sizes = np.bincount(labels.ravel(), minlength=count + 1)
     kept = sizes >= params.least * sizes[1:].max(initial=0)
     kept[0] = False

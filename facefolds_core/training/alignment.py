@@ -91,7 +91,7 @@ def refined(
         turned = Similarity(1.0, turn_of(move[:3]), np.zeros(3))
         shift = equations.middle + move[3:] - turned.apply(equations.middle)
         pose = Similarity(1.0, turned.rotation, shift).after(pose)
-        likeness = float(np.corrcoef(equations.value, equations.value - equations.residual)[0, 1])
+        likeness = equations.likeness()
         if np.abs(move).max() < ENOUGH:
             break
     return pose, likeness
@@ -105,7 +105,7 @@ class Equations:
         middle: (3,) that turns are about.
         slopes: (P, 6) of the residuals in turn and shift; depth: (P,) in a move of the points along their rays.
         residual, value: (P,) difference from the reference, and what the frame shows.
-        weight: (P,) Cauchy's, times the points' own.
+        own, weight: (P,) the points' own, and times Cauchy's.
     """
 
     middle: Array
@@ -113,6 +113,7 @@ class Equations:
     depth: Array
     residual: Array
     value: Array
+    own: Array
     weight: Array
 
     @classmethod
@@ -127,14 +128,18 @@ class Equations:
         middle = pose.apply(np.concatenate([one.positions for one in points]).mean(0))
         rows = [_rows(pose, middle, *one) for one in zip(cameras, points, shown, seen, strict=True)]
         slopes, depth, residual, value, own = (np.concatenate(parts) for parts in zip(*rows, strict=True))
-        typical = float(np.median(np.abs(residual))) if len(residual) else 0.0
-        weight = own / (1 + (residual / (OUTLIER * typical + 1e-9)) ** 2)
-        return cls(middle, slopes, depth, residual, value, weight)
+        weight = own / (1 + (residual / (OUTLIER * middle_of(np.abs(residual), own) + 1e-9)) ** 2)
+        return cls(middle, slopes, depth, residual, value, own, weight)
 
     def normal(self) -> Array:
         """(6, 6)."""
         normal = self.slopes.T @ (self.weight[:, None] * self.slopes)
         return np.asarray(normal + np.diag(DAMPING * np.diag(normal) + 1e-9))
+
+    def likeness(self) -> float:
+        """Correlation of what the frame shows with what the reference showed."""
+        both = np.cov(self.value, self.value - self.residual, aweights=self.own)
+        return float(both[0, 1] / np.sqrt(both[0, 0] * both[1, 1]))
 
     def along_rays(self) -> tuple[float, float]:
         """Curvature and slope of the squared error in a move along the rays, with the pose following (Schur)."""
@@ -165,6 +170,13 @@ def _rows(
     along = unit(points.positions[use] - camera.centre) @ pose.rotation.T
     slopes = np.concatenate([np.cross(there - middle, slope), slope], 1)
     return slopes, (slope * along).sum(1), values[:, 0] - seen[use], values[:, 0], points.weight[use]
+
+
+def middle_of(values: Array, weight: Array) -> float:
+    """The weighted median of (P,), 0 of none."""
+    order = np.argsort(values)
+    share = np.cumsum(weight[order])
+    return float(values[order][np.searchsorted(share, 0.5 * share[-1])]) if len(values) else 0.0
 
 
 def unit(vectors: Array) -> Array:

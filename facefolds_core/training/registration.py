@@ -55,7 +55,7 @@ MAX_DEEPER = 0.01
 MIN_OPACITY = 0.9
 """Least opacity of the volume on a ray that gives a point."""
 
-HEAD = 0.25
+NEARER = 0.25
 """Share of the points that are nearer to the cameras' common centre than one standard deviation of their weight."""
 
 MIN_LIKENESS = 0.6
@@ -93,7 +93,7 @@ def find_track(scene: Scene) -> Found:
     subject, mattes = find_subject(scene, SubjectParams())
     volume, reference = volume_of(subject.splats), reference_frame(scene)
     cameras = [scene.cameras[i] for i in scene.indices("train")]
-    points = centred([surface_points(volume, camera) for camera in cameras])
+    points = weighted([surface_points(volume, camera) for camera in cameras])
     frames = scene.num_frames
     with progress(total=frames * (1 + ROUNDS) - 1, desc="poses", unit="frame") as bar:
         poses, likeness = _all_frames(scene, cameras, points, reference, bar)
@@ -102,7 +102,7 @@ def find_track(scene: Scene) -> Found:
     refused = _refused(poses, likeness, reference)
     poses = _bridged(poses, refused)
     cloud = np.concatenate([one.positions for one in points])
-    middle = cloud.mean(0)
+    middle = np.average(cloud, axis=0, weights=np.concatenate([one.weight for one in points]))
     track = own_track(poses, np.array([pose.apply(middle) for pose in poses]))
     size = float(np.ptp(np.quantile(cloud, [0.01, 0.99], axis=0), axis=0).max())
     shift = max(float(np.linalg.norm(track.at(k).apply(middle) - middle)) for k in range(len(track))) / size
@@ -130,10 +130,16 @@ def surface_points(volume: Volume, camera: Camera) -> Points:
     return Points(there[kept], normals[kept], pixels[kept], np.ones(int(kept.sum())))
 
 
-def centred(points: Sequence[Points]) -> list[Points]:
-    """The points of all cameras, weighted by a normal distribution about the cameras' common centre."""
+def weighted(points: Sequence[Points]) -> list[Points]:
+    """The points of all cameras, weighted by a normal distribution about the cameras' common centre.
+
+    Raises:
+        UserError: if there are none.
+    """
     far = [np.linalg.norm(one.positions, axis=1) for one in points]
-    width = float(np.quantile(np.concatenate(far), HEAD)) if sum(map(len, far)) else 1.0
+    if not sum(map(len, far)):
+        raise UserError("no surface of the subject was found", remedy="name where it is: `centre`, `radius`")
+    width = float(np.quantile(np.concatenate(far), NEARER))
     return [replace(one, weight=np.exp(-0.5 * (r / width) ** 2)) for one, r in zip(points, far, strict=True)]
 
 

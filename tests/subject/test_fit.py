@@ -22,7 +22,7 @@ from facefolds_core.subject.found import background, near_enough, subject_of
 from facefolds_core.subject.gaussians import GaussianParams
 from facefolds_core.subject.mattes import Body, Mattes, body_among
 from facefolds_core.subject.ply import write_ply
-from facefolds_core.subject.splats import COLOUR, COLUMNS, MEAN, OPACITY, SCALE, Splats
+from facefolds_core.subject.splats import COLOUR, COLUMNS, MEAN, OPACITY, SCALE, TURN, Splats
 from facefolds_core.subject.sweep import depth_maps
 from tests.scenes import OPAQUE, first_hit, look_at_origin
 from tests.scenes import render as true_picture
@@ -127,7 +127,7 @@ def test_what_hangs_behind_the_subject_and_is_hidden_by_it_is_none_of_it(scene: 
 
 
 def test_what_hangs_before_a_plain_wall_in_its_colour_is_none_of_the_subject(tmp_path: Path) -> None:
-    """Every picture looks the same without it. What differs from the wall stays."""
+    """Every picture looks the same without it. What differs from the wall stays, and what touches it in pictures."""
     rig = tuple(look_at_origin(f"c{i}", azimuth, 0, 96) for i, azimuth in enumerate((-30, -10, 10, 30)))
     random = np.random.default_rng(0)
     wall, head, beside = random.uniform(-1.5, 1.5, (900, 3)), random.normal(0, 0.06, (300, 3)), np.zeros((12, 3))
@@ -135,7 +135,7 @@ def test_what_hangs_before_a_plain_wall_in_its_colour_is_none_of_the_subject(tmp
     values = np.zeros((1212, COLUMNS), np.float32)
     values[:, MEAN] = np.concatenate([wall, head, beside])
     values[:, SCALE] = np.log(np.repeat([0.08, 0.03, 0.05], [900, 300, 12]))[:, None]
-    values[:, 6], values[:, OPACITY] = 1, 4
+    values[:, TURN.start], values[:, OPACITY] = 1, 4
     values[:, COLOUR] = np.repeat([[0.7, 0.7, 0.7], [0.6, 0.2, 0.1], [0.7, 0.7, 0.7]], [900, 300, 12], 0)
     splats, true = Splats(values, np.full(3, 0.7, np.float32)), Splats(values[:1200], np.full(3, 0.7, np.float32))
     scene = Scene(
