@@ -23,7 +23,9 @@ class StartParams(Section):
     lower on the neck's axis."""
 
     centre_tie: ClassVar[float] = 0.002
-    """Of the charts within this of the least loss of visible surface, the one farthest back wins."""
+    view_tie: ClassVar[float] = 0.015
+    """Of the charts within the first of the least loss of visible surface, and within the second of the least loss of
+    what the camera sees that loses most, the one farthest back wins."""
 
     centre_nodes: ClassVar[int] = 96
     """Rows of the coarse radius map by which charts are compared."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -124,8 +125,8 @@ def whole_window(chart: Chart, params: StartParams) -> Window:
     return -lowest, params.window_limit, -params.azimuth_limit, params.azimuth_limit
 
 
-def lost_share(volume: Volume, chart: Chart, points: Array, params: StartParams) -> float:
-    """Share of visible points that no sheet over the chart can hold.
+def lost(volume: Volume, chart: Chart, points: Array, params: StartParams) -> NDArray[np.bool_]:
+    """(P,) whether no sheet over the chart can hold a visible point.
 
     They lie behind it or at its rim, nearer to c than layers may, or beneath or above the outermost surface in their
     direction by more than two voxels and what the surface's slope explains.
@@ -141,15 +142,20 @@ def lost_share(volume: Volume, chart: Chart, points: Array, params: StartParams)
     i, j = np.rint(i).astype(int).clip(0, rows - 1), np.rint(j).astype(int).clip(0, columns - 1)
     margin = 2 * volume.voxel
     held = within & (radius <= high[i, j] + margin) & (radius >= np.maximum(low[i, j] - margin, MIN_RADIUS))
-    return float(1 - held.mean())
+    return np.asarray(~held)
 
 
-def choose_chart(volume: Volume, points: Array, params: StartParams) -> tuple[Chart, dict[Chart, float]]:
-    """The chart that loses (nearly) the smallest share of `points`, and the shares of all candidates.
+def choose_chart(volume: Volume, views: Sequence[Array], params: StartParams) -> tuple[Chart, dict[Chart, float]]:
+    """The chart that loses (nearly) the smallest share of visible points, over all and in the worst view, and the
+    shares of all candidates.
+
+    Args:
+        views: (P, 3) points of each camera.
 
     Raises:
         UserError: if there are no points.
     """
+    points, sizes = np.concatenate(views), [len(one) for one in views]
     if not len(points):
         raise UserError(
             "no subject was found in the images",
@@ -160,12 +166,13 @@ def choose_chart(volume: Volume, points: Array, params: StartParams) -> tuple[Ch
             "calibration, or take other frames",
         )
     charts = [chart for x in params.centres for chart in _charts(x, points, params)]
-    losses = {chart: lost_share(volume, chart, points, params) for chart in charts}
-    least = min(losses.values())
-    best = min(
-        (c for c, loss in losses.items() if loss <= least + params.centre_tie), key=lambda c: (c.centre[0], losses[c])
-    )
-    return best, losses
+    gone = {chart: lost(volume, chart, points, params) for chart in charts}
+    losses = {chart: float(one.mean()) for chart, one in gone.items()}
+    tied = [c for c, loss in losses.items() if loss <= min(losses.values()) + params.centre_tie]
+    parts = {c: np.split(gone[c], np.cumsum(sizes)[:-1]) for c in tied}
+    worst = {c: max(float(part.mean()) for part in parts[c] if len(part)) for c in tied}
+    kept = (c for c in tied if worst[c] <= min(worst.values()) + params.view_tie)
+    return min(kept, key=lambda c: (c.centre[0], losses[c])), losses
 
 
 def _charts(x: float, points: Array, params: StartParams) -> list[Chart]:

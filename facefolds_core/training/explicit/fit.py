@@ -107,8 +107,9 @@ def fit_scene(scene: Scene, subject: FoundSubject, params: ExplicitParams, other
     start, geometry = params.start, params.geometry
     volume, coarse = (volume_in(scene, subject.splats, cells) for cells in (CELLS, COARSE))
     cameras = [scene.camera_in_head(i, reference_frame(scene)) for i in scene.indices("train")]
-    visible = visible_points(coarse, cameras)
-    chart, losses = choose_chart(coarse, visible, start)
+    views = [visible_points(coarse, [camera]) for camera in cameras]
+    visible = np.concatenate(views)
+    chart, losses = choose_chart(coarse, views, start)
     surface, notes = trusted_surface(scene, coarse, chart, start)
     vertices = None if surface is None else surface[0].astype(np.float64)
     window = fit_window(coarse, chart, visible, vertices, start)
