@@ -120,7 +120,7 @@ class Mattes:
 
     @cached_property
     def _colours(self) -> Colours | None:
-        """Of the pictures by which the body was found."""
+        """Of the pictures of the body's frame, by the body as it was found."""
         assert self.body is not None
         body = self.body
         return colours_of(_pictures(self.scene, body.splats, body.frame, body.subject), self.edge)

@@ -155,7 +155,7 @@ def choose_chart(volume: Volume, views: Sequence[Array], params: StartParams) ->
     Raises:
         UserError: if there are no points.
     """
-    points, sizes = np.concatenate(views), [len(one) for one in views]
+    points, ends = np.concatenate(views), np.cumsum([len(one) for one in views])[:-1]
     if not len(points):
         raise UserError(
             "no subject was found in the images",
@@ -169,8 +169,7 @@ def choose_chart(volume: Volume, views: Sequence[Array], params: StartParams) ->
     gone = {chart: lost(volume, chart, points, params) for chart in charts}
     losses = {chart: float(one.mean()) for chart, one in gone.items()}
     tied = [c for c, loss in losses.items() if loss <= min(losses.values()) + params.centre_tie]
-    parts = {c: np.split(gone[c], np.cumsum(sizes)[:-1]) for c in tied}
-    worst = {c: max(float(part.mean()) for part in parts[c] if len(part)) for c in tied}
+    worst = {c: max(float(part.mean()) for part in np.split(gone[c], ends) if len(part)) for c in tied}
     kept = (c for c in tied if worst[c] <= min(worst.values()) + params.view_tie)
     return min(kept, key=lambda c: (c.centre[0], losses[c])), losses
 

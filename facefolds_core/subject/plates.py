@@ -58,8 +58,11 @@ def from_plate(image: Image, plate: Image, params: PlateParams | None = None, st
 
 
 def _different(image: Image, plate: Image, params: PlateParams, opacity: Array | None) -> Image:
-    """(H, W) 1 where picture and plate differ, without small things, and without holes but where no Gaussians are:
-    through glasses one sees the room."""
+    """(H, W) 1 where picture and plate differ, without small things, its holes filled as `filled` says.
+
+    Args:
+        opacity: (H, W) of the Gaussians, once they are known.
+    """
     one, two = (cv2.GaussianBlur(part.astype(np.float32), (0, 0), params.blur) / 255 for part in (image, plate))
     difference = np.abs(one - two).max(-1)
     # Beyond the picture's border what is cut off goes on: else closing would gnaw at it.

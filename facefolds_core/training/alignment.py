@@ -128,7 +128,9 @@ class Equations:
         middle = pose.apply(np.concatenate([one.positions for one in points]).mean(0))
         rows = [_rows(pose, middle, *one) for one in zip(cameras, points, shown, seen, strict=True)]
         slopes, depth, residual, value, own = (np.concatenate(parts) for parts in zip(*rows, strict=True))
-        weight = own / (1 + (residual / (OUTLIER * middle_of(np.abs(residual), own) + 1e-9)) ** 2)
+        off = np.abs(residual)
+        typical = float(np.quantile(off, 0.5, weights=own, method="inverted_cdf")) if len(off) else 0.0
+        weight = own / (1 + (residual / (OUTLIER * typical + 1e-9)) ** 2)
         return cls(middle, slopes, depth, residual, value, own, weight)
 
     def normal(self) -> Array:
@@ -170,13 +172,6 @@ def _rows(
     along = unit(points.positions[use] - camera.centre) @ pose.rotation.T
     slopes = np.concatenate([np.cross(there - middle, slope), slope], 1)
     return slopes, (slope * along).sum(1), values[:, 0] - seen[use], values[:, 0], points.weight[use]
-
-
-def middle_of(values: Array, weight: Array) -> float:
-    """The weighted median of (P,), 0 of none."""
-    order = np.argsort(values)
-    share = np.cumsum(weight[order])
-    return float(values[order][np.searchsorted(share, 0.5 * share[-1])]) if len(values) else 0.0
 
 
 def unit(vectors: Array) -> Array:
