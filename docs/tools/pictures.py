@@ -1,6 +1,6 @@
 """The documents' pictures of a subject, and whether they are still what would be made today.
 
-python -m docs.tools.pictures              makes face.webp, actor.jpg, limits.jpg, report.jpg, player.jpg, sizes.jpg
+python -m docs.tools.pictures              makes face.webp, actor, frames, limits, report, player and sizes.jpg
 python -m docs.tools.pictures --check      refuses pictures that are not of this asset, these options, or were edited
 
 What each was made from stands in docs/images/made.json; report.jpg needs `facefolds report data/actor` and Chromium,
@@ -16,6 +16,7 @@ from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
+import numpy as np
 import typer
 from PIL import Image
 from playwright.sync_api import Browser, sync_playwright
@@ -28,12 +29,14 @@ from facefolds_core.cli.render import shrink
 from facefolds_core.errors import UserError, report_user_errors
 from facefolds_core.files.pictures import open_picture
 from facefolds_core.files.writing import atomic_file, file_sha256, read_json, write_json
+from facefolds_core.rendering.areas import view_of
 from facefolds_core.rendering.camera_paths import Eye, camera_of, frame_due, turntable
 from facefolds_core.rendering.opengl import OpenGLRenderer
 from facefolds_core.rendering.opengl_reflection import Glossy
 from facefolds_core.rendering.pixels import SIDE, finer
 from facefolds_core.serving.player import find_player
 from facefolds_core.serving.server import serving
+from facefolds_core.spacing import spread
 from tests.chromium import FLAGS, chromium
 
 IMAGES = ROOT / "docs" / "images"
@@ -55,6 +58,12 @@ FULL = "document.querySelector('facefolds-player').level === 'full'"
 LIMITS: dict[str, Any] = {"size": [500, 768], "panel": [216, 264], "gap": 6, "frame": 2, "quality": 85}
 LIMITS |= {"views": [[115, 8, 30, 40, 440], [24, 12, 220, 25, 216], [4, 2, 130, 380, 216]]}
 """Azimuth and elevation in degrees, then left, top and width of what is cut out of a picture of `size`, pixels."""
+
+
+FRAMES: dict[str, Any] = {"camera": "A011", "panel": [150, 172], "columns": 6, "most": 30, "gap": 4, "quality": 84}
+FRAMES |= {"corners": [[-58, -34, 930], [58, 92, 930]]}
+"""A held-out camera; pixels of a picture, pictures a row, frames at most; eyes and mouth lie between the corners,
+millimetres in the world of the actor's capture."""
 
 
 class Picture(NamedTuple):
@@ -109,6 +118,30 @@ def limits(subject: Path, out: Path) -> None:
     for left, shot in zip(places, shots, strict=True):
         whole.paste(shot, (left, 0))
     whole.save(out, "JPEG", quality=LIMITS["quality"], optimize=True)
+
+
+def every_frame(subject: Path, out: Path) -> None:
+    """Eyes and mouth of every frame, or of as many, evenly, as there is room for: the photo above the asset, which
+    stands in the empty room."""
+    asset, scene = read_asset(subject / "asset"), read_scene(subject / "scene")
+    panel, columns, gap = FRAMES["panel"], FRAMES["columns"], FRAMES["gap"]
+    index = next(i for i, camera in enumerate(scene.cameras) if camera.name == FRAMES["camera"])
+    photos, plates = scene.open_frames(), scene.open_plates()
+    corners = scene.from_capture.apply(np.array(FRAMES["corners"], float))
+    room = None if plates is None else plates.image(index, 0) / 255
+    pairs = []
+    for frame in spread(range(scene.num_frames), FRAMES["most"]):
+        seen, _ = scene.camera_in_head(index, frame).project(corners)
+        box = tuple(np.rint([*seen.min(0), *seen.max(0)]).astype(int).tolist())
+        rgb, alpha = view_of(asset.full, scene.cameras[index], frame).composite(asset.frame(frame))
+        drawn = rgb + (1 - alpha[..., None]) * (1.0 if room is None else room)
+        both = photos.image(index, frame), np.rint(255 * drawn.clip(0, 1)).astype(np.uint8)
+        cut = [Image.fromarray(rgb).crop(box).resize(panel, Image.Resampling.LANCZOS) for rgb in both]
+        pairs.append(np.vstack([np.asarray(one) for one in cut]))
+    pairs = [np.pad(pair, ((0, 2 * gap), (0, gap), (0, 0)), constant_values=255) for pair in pairs]
+    pairs += [np.full_like(pairs[0], 255)] * (-len(pairs) % columns)
+    rows = [np.hstack(pairs[k : k + columns]) for k in range(0, len(pairs), columns)]
+    Image.fromarray(np.vstack(rows)).save(out, "JPEG", quality=FRAMES["quality"], optimize=True)
 
 
 def page(subject: Path, out: Path) -> None:
@@ -173,6 +206,7 @@ def side_by_side(shots: Sequence[Image.Image], gap: int, out: Path, quality: int
 PICTURES = {
     "face.webp": Picture("asset/manifest.json", FILM, film),
     "actor.jpg": Picture("evaluation/contact_sheet.png", SHEET, sheet),
+    "frames.jpg": Picture("asset/manifest.json", FRAMES, every_frame),
     "limits.jpg": Picture("asset/manifest.json", LIMITS, limits),
     "report.jpg": Picture("metrics.json", PAGE, page),
     "player.jpg": Picture("asset/manifest.json", PLAYER, partial(player, PLAYER)),

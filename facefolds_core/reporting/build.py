@@ -21,7 +21,7 @@ from facefolds_core.reporting import charts, pictures, tables, words
 from facefolds_core.reporting.face import face
 from facefolds_core.reporting.facts import Facts, finite, read_facts
 from facefolds_core.scoring.films import read_films
-from facefolds_core.scoring.pictures import WORST
+from facefolds_core.scoring.pictures import WORST, training_picture
 from facefolds_core.scoring.report import headline
 from facefolds_core.scoring.terminal import HEADLINE_WORDS
 
@@ -104,6 +104,7 @@ def context(subject: Subject) -> dict[str, Any]:
         "heat": tables.heat_map(facts.images, key, places) if facts.images else None,
         "camera_map": Markup(sketch(scene)) if scene else None,
         "worst": worst(subject),
+        "bad_views": bad_views(subject),
         "textures": textures(subject),
         "curves": [(words.curve_name(name), charts.line_chart(of)) for name, of in facts.curves.items()],
         "fit_notes": [worded(one) for part in ("reasons", "events") for one in (facts.fit or {}).get(part, [])],
@@ -156,6 +157,15 @@ def worst(subject: Subject) -> dict[str, str] | None:
         return None
     label = words.frame_label(subject.scene.frame_ids if subject.scene else (), frame)
     return {"src": pictures.stored(path), "words": f"camera {camera}, frame {label}; {words.number(psnr)} dB {what}"}
+
+
+def bad_views(subject: Subject) -> list[dict[str, str]]:
+    """Photo beside asset of the training cameras that `evaluate` warned of; those whose pictures are there."""
+    there = set((subject.evaluation / "pictures").glob("*.png"))  # a name in a file may lead anywhere
+    facts = [one for one in subject.facts.metrics.get("warnings", ()) if isinstance(one, dict)]
+    cameras = [str(one.get("camera")) for one in facts if one.get("kind") == "training_view_bad"]
+    paths = {camera: training_picture(subject.evaluation / "pictures", camera) for camera in cameras}
+    return [{"camera": camera, "src": pictures.stored(path)} for camera, path in paths.items() if path in there]
 
 
 def films(subject: Subject) -> dict[str, Any]:

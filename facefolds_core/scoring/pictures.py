@@ -30,11 +30,16 @@ def write_worst(path: Path, worst: Panel, patch: WorstPatch | None) -> None:
     return _write(path, *framed)
 
 
+def training_picture(folder: Path, camera: str) -> Path:
+    """Where `write_training_views` puts the picture of a camera."""
+    return folder / f"training_{camera}.png"
+
+
 def write_training_views(folder: Path, views: Sequence[TrainingView]) -> None:
-    """`training_CAMERA.png`: photo beside asset."""
+    """Photo beside asset of each, in a new folder."""
     folder.mkdir()
     for view in views:
-        _write(folder / f"training_{view.camera}.png", view.truth, view.asset)
+        _write(training_picture(folder, view.camera), view.truth, view.asset)
 
 
 def _write(path: Path, truth: Array, asset: Array) -> None:

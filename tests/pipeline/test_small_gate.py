@@ -34,6 +34,9 @@ KEPT = {
     "ssim_high": 0.773,
     "opacity_inside": 0.001,
     "opacity_edge": 0.043,
+    "opacity_outside": 0.0,
+    "worst_patch": 15.8,
+    "without_reflection": 25.0,
 }
 """Of the small film with true mattes, with the default parameters but those below."""
 SLACK = 2.0
@@ -154,6 +157,20 @@ def test_outlines_that_are_too_thin_are_caught(scene: Scene, run: Run, monkeypat
 
     monkeypatch.setattr(AreaView, "composite", thin)
     assert "opacity_edge" in caught(run, judge(scene, run.model, run.asset))
+
+
+def test_a_subject_that_what_stands_behind_paints_is_caught(
+    scene: Scene, run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The layers leave a third of their light to a background that shows the subject: over it nothing is missing."""
+    whole = AreaView.composite
+
+    def veiled(view: AreaView, *arguments: Any, **options: Any) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        rgb, alpha = whole(view, *arguments, **options)
+        return rgb * np.float32(2 / 3), alpha * np.float32(2 / 3)
+
+    monkeypatch.setattr(AreaView, "composite", veiled)
+    assert caught(run, judge(scene, run.model, run.asset)) >= {"psnr_any", "opacity_inside", "worst_patch"}
 
 
 def test_geometry_that_drifts_is_caught(scene: Scene, run: Run) -> None:

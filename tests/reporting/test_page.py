@@ -7,6 +7,7 @@ import re
 import shutil
 from pathlib import Path
 
+import numpy as np
 import pytest
 import typer
 from typer.testing import CliRunner
@@ -16,9 +17,11 @@ from facefolds_core.cli.scores import evaluated_subjects
 from facefolds_core.errors import UserError
 from facefolds_core.facts import fact
 from facefolds_core.files.paths import SubjectFolders
-from facefolds_core.files.writing import write_json
+from facefolds_core.files.writing import read_json, write_json
 from facefolds_core.reporting.build import make_report
 from facefolds_core.scoring.films import FILMS
+from facefolds_core.scoring.pictures import write_training_views
+from facefolds_core.scoring.training_scores import METRICS, TrainingView, bad_views, warnings_of
 from tests.reporting.tiny import FRAMES, LAYERS, make_subject
 
 
@@ -114,6 +117,18 @@ def test_what_is_not_well_stands_at_the_head(copy: SubjectFolders) -> None:
     page = page_of(copy)
     assert "One thing is not well" in page and "name a camera that faces the" in page
     assert page.index("not well") < page.index('class="tiles"')
+
+
+def test_bad_training_views_are_shown(copy: SubjectFolders) -> None:
+    metrics, black = read_json(copy.metrics), np.zeros((4, 4, 3))
+    both = zip("abcd", (30.0, 31.0, 30.0, 20.0), strict=True)
+    views = [TrainingView(name, "0", dict.fromkeys(METRICS, psnr), black, black) for name, psnr in both]
+    metrics["warnings"] = [one.to_json() for one in warnings_of(views)]
+    write_json(copy.metrics, metrics)
+    assert "see it badly" not in page_of(copy)
+    write_training_views(copy.evaluation / "pictures", bad_views(views))
+    text = page_of(copy)
+    assert text.count("Training camera d: the photo, and the asset") == 1 and "Training camera a" not in text
 
 
 def test_the_asset_has_one_size(copy: SubjectFolders) -> None:
