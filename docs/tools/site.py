@@ -47,6 +47,8 @@ FRAME = (
     'allow="fullscreen"></iframe>'
 )
 
+BESIDE = '<a href="hero.html#photo=0">Beside a picture that no training saw: drag the border.</a>'
+
 
 def place_of(path: str) -> str:
     """Where a file of the checkout is on the site; other files than documents lie under files/ as they are."""
@@ -109,9 +111,17 @@ def hero_age(root: Path = ROOT) -> str:
     return f"Made by {commit}, {count}."
 
 
-def first_page(text: str, player: bool, age: str = "") -> str:
-    """README.md with the player in place of its first picture, where there is one, and the hero's age below."""
-    frame = f"{FRAME}<p><small>{age}</small></p>" if age else FRAME
+def has_photos(root: Path = ROOT) -> bool:
+    """Whether the hero has photos to be held against."""
+    folder = (root / HERO).parent / "asset"
+    return (root / HERO).exists() and folder.is_dir() and bool(read_asset(folder).manifest.photos)
+
+
+def first_page(text: str, player: bool, age: str = "", photos: bool = False) -> str:
+    """README.md with the player in place of its first picture, where there is one, and below it the hero's age, and
+    where it is seen beside a photo, with a border to drag."""
+    below = [*([BESIDE] if photos else []), *([age] if age else [])]
+    frame = f"{FRAME}<p><small>{' '.join(below)}</small></p>" if below else FRAME
     return re.sub(r"^!\[[^\]]*\]\([^)]*\)", lambda _: frame, text, count=1, flags=re.MULTILINE) if player else text
 
 
@@ -166,7 +176,10 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
     for source in sorted(documents):
         text = (ROOT / source).read_text(encoding="utf-8")
         text, more = relinked(
-            with_steps(first_page(text, playing is not None, hero_age())) if source == "README.md" else text, source
+            with_steps(first_page(text, playing is not None, hero_age(), has_photos()))
+            if source == "README.md"
+            else text,
+            source,
         )
         wanted |= more
         place = place_of(source)

@@ -8,7 +8,18 @@ from pathlib import Path
 import pytest
 
 import facefolds_core
-from docs.tools.site import ACTOR, FRAME, HERO, HERO_COMMIT, api_page, first_page, hero_age, playing_page, relinked
+from docs.tools.site import (
+    ACTOR,
+    FRAME,
+    HERO,
+    HERO_COMMIT,
+    api_page,
+    first_page,
+    has_photos,
+    hero_age,
+    playing_page,
+    relinked,
+)
 from facefolds_core.errors import UserError
 from tests.assets import make_asset
 
@@ -88,6 +99,15 @@ def test_the_hero_says_its_age(tmp_path: Path) -> None:
     (tmp_path / HERO_COMMIT).write_text("0123456789ab")
     assert hero_age(tmp_path) == "Made by 0123456789ab, which is not in this history."
     assert f"{FRAME}<p><small>old</small></p>" in first_page("![x](y)", True, "old")
+
+
+def test_a_hero_with_photos_is_held_against_one(tmp_path: Path) -> None:
+    assert not has_photos(tmp_path)
+    make_asset((tmp_path / HERO).parent / "asset", frames=1)
+    (tmp_path / HERO).write_text("the hero")
+    assert not has_photos(tmp_path)
+    assert "hero.html#photo=0" in first_page("![x](y)", True, photos=True)
+    assert "hero.html#photo=0" not in first_page("![x](y)", True)
 
 
 def test_the_librarys_page_has_every_name() -> None:

@@ -8,6 +8,7 @@ import subprocess
 import tarfile
 from pathlib import Path
 
+import facefolds_core as facefolds
 from tests.viewer.conftest import Show
 
 
@@ -22,7 +23,8 @@ def test_the_package_holds_the_player_and_its_types(project_root: Path, player_f
     package = json.loads((viewer / "package.json").read_text())
     assert package["private"] is True  # never published by mistake
     entry = package["exports"]["."]
-    assert {entry["default"][2:], entry["types"][2:], "dist/draco/worker.js", "README.md"} <= names
+    assert {entry["default"][2:], entry["types"][2:], "dist/draco/worker.js", "README.md", "LICENSE"} <= names
+    assert package["version"] == facefolds.__version__
     assert {f"dist/{path.name}" for path in player_folder.glob("*-*.js")} <= names
     assert not any(name.endswith((".map", ".ts")) and name != "types.d.ts" for name in names)
 
