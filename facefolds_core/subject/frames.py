@@ -23,6 +23,8 @@ RATE_COLOUR = 0.015
 """Adam's, of colours: in so few steps they must come from skin to the white of an eye."""
 RIDE = 0.03
 """Gaussians so far off a tracked mesh, units, stay where they are: a mesh knows no hair. Nearer ones ride in part."""
+NEIGHBOURS = 64
+"""Gaussians stand still together with so many others."""
 CHANGED = 0.02
 """A Gaussian changes in a frame if its pixels err by this much more than in the frame of the start."""
 
@@ -62,6 +64,19 @@ def ridden(splats: Splats, start: NDArray[np.float64], now: NDArray[np.float64])
     values = splats.values.copy()
     values[:, MEAN] += (share * (now - start)[nearest]).astype(np.float32)
     return Splats(values, splats.background)
+
+
+def standing(splats: Splats, moved: Splats, targets: Sequence[Target]) -> Array:
+    """(N,) by how much less each Gaussian errs in a frame if it stands still in the room than if it moves with the
+    head: mean over its neighbours, since a body stands still or moves in large parts.
+
+    Args:
+        splats: in the head's own frame.
+        moved: where they are in it if they stand still.
+    """
+    less = mean_errors(splats, targets) - mean_errors(moved, targets)
+    _, near = cKDTree(splats.means).query(splats.means, min(NEIGHBOURS, len(splats)))
+    return np.asarray(less[near].reshape(len(splats), -1).mean(1), np.float32)
 
 
 def changed_to(splats: Splats, usual: Array, targets: Sequence[Target], seed: int) -> Splats:

@@ -103,9 +103,14 @@ class TextureState:
             own = torch.from_numpy(rgb) - self.colour[0][:, None]
             self.layers[0, ..., :3] = torch.where(torch.from_numpy(opacity)[..., None] > MIN_OPACITY, own, 0.0)
 
-    def fill_frame(self, frame: int, opacity: NDArray[np.float32]) -> None:
-        """Begin one frame with an opacity (M, N) of its own."""
+    def fill_frame(self, frame: int, opacity: NDArray[np.float32], rgb: NDArray[np.float32] | None = None) -> None:
+        """Begin one frame with an opacity (M, N) of its own, and with colours (M, N, 3), as far as one change of all
+        layers' colours brings them; None keeps what it has."""
         self.frame_alpha[0, frame] = _logits(opacity) - self.layers[0, ..., 3]
+        if rgb is not None:
+            weight = torch.from_numpy(opacity)[..., None]
+            change = torch.from_numpy(rgb) - self.colour[0][:, None] - self.layers[0, ..., :3]
+            self.frame_colour[0, frame] = (weight * change).sum(1) / weight.sum(1).clamp(min=MIN_OPACITY)
 
     def believe(self, opacity: NDArray[np.float32]) -> None:
         """Keep the layers' opacity near this, (M, N), where pictures say little."""

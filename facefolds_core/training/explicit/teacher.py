@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,8 +18,9 @@ from numpy.typing import NDArray
 from facefolds_core.captures.scene import Scene
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.subject.drawing import draw, view_of
+from facefolds_core.subject.foreign import moved as turned
 from facefolds_core.subject.found import reference_frame
-from facefolds_core.subject.frames import changed_to, mean_errors, ridden, targets_of
+from facefolds_core.subject.frames import changed_to, mean_errors, ridden, standing, targets_of
 from facefolds_core.subject.splats import Splats
 from facefolds_core.subject.storage import FoundSubject
 from facefolds_core.subject.virtual import seen_by_few, virtual_cameras
@@ -66,6 +67,7 @@ class Teacher:
         self._usual: NDArray[np.float32] | None = None
         self._known = {self._first: splats}
         self._mesh: NDArray[np.float32] | None = None
+        self._stand = np.zeros(len(splats), bool)
         real = self._real(self._first)
         self._believed = found.psnr >= MIN_START_PSNR
         cameras = virtual_cameras(real, splats, (scene.width, scene.height)) if self._believed else ()
@@ -77,7 +79,7 @@ class Teacher:
 
     def others(self, photos: Callable[[int], Image]) -> list[Splats]:
         """The Gaussians of the `OTHERS` frames that look least like that of the start and one another. From then on it
-        is known whether Gaussians ride on the tracked mesh.
+        is known whether Gaussians ride on the tracked mesh, and which stand still while the head turns.
 
         Args:
             photos: as of `cut`.
@@ -89,12 +91,18 @@ class Teacher:
         surface = self._scene.load_surface()
         if surface is not None and all(self._rides(surface[0], frame, photos) for frame in others):
             self._mesh = surface[0]
+        if self._scene.poses is not None:
+            self._stand = np.mean([self._standing(frame, photos) for frame in others], 0) > 0
         return [self._at(frame, photos) for frame in others]
 
     def moved(self, frame: int) -> Splats | None:
-        """The Gaussians of a frame as the tracked mesh says; None where they are those of the start, or ride on no
-        mesh."""
-        return None if self._mesh is None or frame == self._first else self._ridden(self._mesh, frame)
+        """The Gaussians of a frame as the tracked mesh says, but for those that stand still while the head turns; None
+        where they are those of the start, or nothing says where they are."""
+        if frame == self._first or (self._mesh is None and not self._stand.any()):
+            return None
+        found = self._splats if self._mesh is None else self._ridden(self._mesh, frame)
+        where = self._stand[:, None]
+        return replace(found, values=np.where(where, self._still(frame).values, found.values)) if where.any() else found
 
     def cut(self, frame: int, photos: Callable[[int], Image]) -> Image:
         """(V, H W, 4) RGBA of a frame, colours times opacity.
@@ -118,6 +126,15 @@ class Teacher:
     def _ridden(self, mesh: NDArray[np.float32], frame: int) -> Splats:
         start, now = (mesh[k].astype(np.float64) for k in (self._first, frame))
         return ridden(self._splats, start, now)
+
+    def _still(self, frame: int) -> Splats:
+        """Where they are in the head's own frame if they stay in the room where they were in the frame of the start."""
+        poses = self._scene.poses
+        assert poses is not None
+        return turned(self._splats, poses.at(frame).inverse().after(poses.at(self._first)))
+
+    def _standing(self, frame: int, photos: Callable[[int], Image]) -> NDArray[np.float32]:
+        return standing(self._splats, self._still(frame), targets_of(self._real(frame), photos(frame)))
 
     def _rides(self, mesh: NDArray[np.float32], frame: int, photos: Callable[[int], Image]) -> bool:
         """Whether Gaussians that ride on the mesh (K, V, 3) explain the photos of a frame better."""

@@ -159,7 +159,8 @@ class Trainer:
             for frame in range(self.scene.num_frames):
                 splats = self.teacher.moved(frame)
                 if splats is not None:
-                    self.state.fill_frame(frame, held(volume_in(self.scene, splats))[0])
+                    opacity, rgb = held(volume_in(self.scene, splats))
+                    self.state.fill_frame(frame, opacity, rgb if colours else None)
 
     def _recentre(self) -> None:
         """Move the middle radius to where this round found opacity, mean over frames."""
