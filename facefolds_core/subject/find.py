@@ -86,12 +86,12 @@ def find_subject(
     if start is not None or not all(mattes.known(key) for key in keys):
         body = _body(scene, how, params.seed, start)
         mattes, begun = Mattes(scene, named, body), body.splats.part(body.subject)
-    views = [view_cut_out(scene, mattes, key) for key in keys]
+    views = [view_cut_out(scene, mattes, key) for key in _agreeing(scene, mattes, keys)]
     if not any((view.opacity > 0.5).any() for view in views):
         raise _nothing(scene)
     if start is None:
         mattes.alone = _fit_alone(scene, views, how, params.seed, begun)
-        views = [view_cut_out(scene, mattes, key) for key in keys]
+        views = [view_cut_out(scene, mattes, key) for key in _agreeing(scene, mattes, keys)]
         splats = _fit_alone(scene, views, how, params.seed, mattes.alone)
     else:
         assert begun is not None
@@ -99,6 +99,16 @@ def find_subject(
     mattes.alone = splats
     fit, psnr = judged(scene, splats, views)
     return FoundSubject(splats, psnr, fit), mattes
+
+
+def _agreeing(scene: Scene, mattes: Mattes, keys: Sequence[Key]) -> list[Key]:
+    """The pictures that one body can show: of one frame, where a part of it is known to stand still while the rest
+    turns."""
+    told = mattes.body is not None or mattes.alone is not None
+    several = len({frame for _, frame in keys}) > 1
+    if not (told and several and mattes.anything_stands):
+        return list(keys)
+    return [key for key in keys if key[1] == reference_frame(scene)]
 
 
 def _fit_alone(scene: Scene, views: Sequence[View], how: GaussianParams, seed: int, begun: Splats | None) -> Splats:

@@ -23,8 +23,6 @@ RATE_COLOUR = 0.015
 """Adam's, of colours: in so few steps they must come from skin to the white of an eye."""
 RIDE = 0.03
 """Gaussians so far off a tracked mesh, units, stay where they are: a mesh knows no hair. Nearer ones ride in part."""
-NEIGHBOURS = 64
-"""Gaussians stand still together with so many others."""
 CHANGED = 0.02
 """A Gaussian changes in a frame if its pixels err by this much more than in the frame of the start."""
 
@@ -32,16 +30,25 @@ CHANGED = 0.02
 def mean_errors(splats: Splats, targets: Sequence[Target]) -> Array:
     """(N,) mean of |C - I| + |opacity's error| over the pixels that show a Gaussian, weighted as they show it; 0 of
     those that none shows."""
-    sums, weights = np.zeros(len(splats)), np.zeros(len(splats))
+    sums, weights = shown_errors(splats, targets)
+    return np.where(weights > 0, sums / np.maximum(weights, 1e-6), 0).astype(np.float32)
+
+
+def shown_errors(splats: Splats, targets: Sequence[Target]) -> tuple[Array, Array]:
+    """(N,) sums of these errors, and of their weights; of targets with their room, of colours alone."""
+    sums, weights = np.zeros(len(splats), np.float32), np.zeros(len(splats), np.float32)
     for target in targets:
         drawing = draw(splats.values, target.view)
-        assert target.opacity is not None
-        error = np.abs(drawing.rgb - target.picture).mean(0) + np.abs(1 - drawing.light - target.opacity)
+        if target.opacity is None:
+            behind = drawing.light * splats.background[:, None, None]
+            error = np.abs(drawing.rgb + behind - target.picture).mean(0)
+        else:
+            error = np.abs(drawing.rgb - target.picture).mean(0) + np.abs(1 - drawing.light - target.opacity)
         wish = np.stack([error, np.ones_like(error), np.zeros_like(error)])
         gradient, _ = differentiate(splats.values, drawing, wish, np.zeros_like(error))
         sums += gradient[:, COLOUR][:, 0]
         weights += gradient[:, COLOUR][:, 1]
-    return np.where(weights > 0, sums / np.maximum(weights, 1e-6), 0).astype(np.float32)
+    return sums, weights
 
 
 def targets_of(cameras: Sequence[Camera], cut: NDArray[np.uint8]) -> list[Target]:
@@ -64,19 +71,6 @@ def ridden(splats: Splats, start: NDArray[np.float64], now: NDArray[np.float64])
     values = splats.values.copy()
     values[:, MEAN] += (share * (now - start)[nearest]).astype(np.float32)
     return Splats(values, splats.background)
-
-
-def standing(splats: Splats, moved: Splats, targets: Sequence[Target]) -> Array:
-    """(N,) by how much less each Gaussian errs in a frame if it stands still in the room than if it moves with the
-    head: mean over its neighbours, since a body stands still or moves in large parts.
-
-    Args:
-        splats: in the head's own frame.
-        moved: where they are in it if they stand still.
-    """
-    less = mean_errors(splats, targets) - mean_errors(moved, targets)
-    _, near = cKDTree(splats.means).query(splats.means, min(NEIGHBOURS, len(splats)))
-    return np.asarray(less[near].reshape(len(splats), -1).mean(1), np.float32)
 
 
 def changed_to(splats: Splats, usual: Array, targets: Sequence[Target], seed: int) -> Splats:

@@ -3,16 +3,19 @@ the picture's colours say."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
+from facefolds_core.captures.cutout import cut_from
 from facefolds_core.captures.scene import Scene
 from facefolds_core.geometry.cameras import Camera
+from facefolds_core.spacing import spread
 from facefolds_core.subject.cut_out import (
     Array,
     Bool,
@@ -27,6 +30,7 @@ from facefolds_core.subject.cut_out import (
     softened,
 )
 from facefolds_core.subject.drawing import draw, view_of
+from facefolds_core.subject.fit import Target, target_of
 from facefolds_core.subject.found import (
     background,
     belief,
@@ -38,6 +42,7 @@ from facefolds_core.subject.found import (
 )
 from facefolds_core.subject.plates import Start, from_plate
 from facefolds_core.subject.splats import Splats
+from facefolds_core.subject.standing import farthest_turned, if_still, in_frame, standing
 from facefolds_core.subject.storage import Body
 
 Image = NDArray[np.uint8]
@@ -46,6 +51,9 @@ Key = tuple[int, int]
 Source = Literal["capture", "named", "plate", "picture", "gaussians"]
 """Whence a matte is: it came with the capture, the user has named it, or it was found: beside a plate, in the picture,
 or, where the picture contradicts the others, from their Gaussians alone."""
+
+LOOKED_AT = 12
+"""Pictures of a frame that tell what stands still, at most."""
 
 
 @dataclass(frozen=True)
@@ -90,21 +98,18 @@ class Mattes:
         self._frames, self._plates, self._given = scene.open_frames(), scene.open_plates(), scene.open_mattes()
         self._drawn: tuple[Key, tuple[Array, Array]] | None = None
         self._drawn_alone: tuple[Splats, Key, Array] | None = None
+        self._labelled: tuple[Splats, Bool] | None = None
 
     def known(self, key: Key) -> bool:
         """Whether it needs no Gaussians."""
         given = self._given is not None and key in self._given
-        return key in self.named or given or (self._plates is not None and (key[0], 0) in self._plates)
+        return key in self.named or given or self._plated(key)
 
     def of(self, key: Key) -> Matte:
         """Of a picture that is there."""
-        if key in self.named:
-            return Matte(self.named[key][..., 0], "named")
-        if self._given is not None and key in self._given:
-            return Matte(self._given.image(*key)[..., 0], "capture")
+        if self.known(key):
+            return self._plain(key, self._start)
         picture = self._frames.image(*key)
-        if self._plates is not None and (key[0], 0) in self._plates:
-            return Matte(_bytes(from_plate(picture, self._plates.image(key[0], 0), start=self._start(key))), "plate")
         assert self.body is not None
         camera, (start, behind) = self.scene.camera_in_head(*key), self._seen(key)
         colours = self._colours
@@ -117,6 +122,23 @@ class Mattes:
         if share < (self.edge.asked if key[1] == self.body.frame else self.edge.agreeing):
             return Matte(_bytes(start), "gaussians", share)
         return Matte(_bytes(softened(picture, cut, start, behind, camera, self.edge)), "picture", share)
+
+    def _plated(self, key: Key) -> bool:
+        return self._plates is not None and (key[0], 0) in self._plates
+
+    def _plain(self, key: Key, start: Callable[[Key], Start | None] = lambda _: None) -> Matte:
+        """Of a picture for which no Gaussians are needed.
+
+        Args:
+            start: what Gaussians say of it all the same, beside a plate.
+        """
+        if key in self.named:
+            return Matte(self.named[key][..., 0], "named")
+        if self._given is not None and key in self._given:
+            return Matte(self._given.image(*key)[..., 0], "capture")
+        assert self._plates is not None
+        found = from_plate(self._frames.image(*key), self._plates.image(key[0], 0), start=start(key))
+        return Matte(_bytes(found), "plate")
 
     @cached_property
     def _colours(self) -> Colours | None:
@@ -137,9 +159,71 @@ class Mattes:
         assert self.alone is not None
         known, same = self._drawn_alone, self._view(key)
         if known is None or known[0] is not self.alone or known[1] != same:
-            seen = draw(self.alone.values, view_of(self.scene.camera_in_head(*key))).picture()
+            there = self._in_frame(self.alone, self._alone_stands(), reference_frame(self.scene), key[1])
+            seen = draw(there.values, view_of(self.scene.camera_in_head(*key))).picture()
             known = self._drawn_alone = self.alone, same, np.asarray(1 - seen[1])
         return known[2]
+
+    @cached_property
+    def stands(self) -> Bool:
+        """(N,) which of the body's Gaussians stand still while the head turns: the room, and perhaps shoulders."""
+        assert self.body is not None
+        body, poses = self.body, self.scene.poses
+        if poses is None:
+            return np.zeros(len(body.splats), bool)
+        pairs, targets = [], []
+        for frame in farthest_turned(poses, body.frame):
+            still = if_still(body.splats, poses, body.frame, frame)
+            pairs.append((in_frame(body.splats, ~body.subject, poses, body.frame, frame), still))
+            seen = [(self.scene.camera_in_head(*key), self._frames.image(*key)) for key in self._keys(frame)]
+            targets.append([target_of(camera, _values(photo), None, 1.0) for camera, photo in seen])
+        return ~body.subject | standing(pairs, targets, body.splats.means, body.subject)
+
+    @property
+    def anything_stands(self) -> bool:
+        """Whether a part of the subject stands still while the head turns."""
+        if self.body is not None:
+            return bool((self.stands & self.body.subject).any())
+        return bool(self._alone_stands().any())
+
+    def _alone_stands(self) -> Bool:
+        """(N,) which of the Gaussians that were trained with the subject cut out stand still while the head turns."""
+        assert self.alone is not None
+        if self._labelled is None or self._labelled[0] is not self.alone:
+            self._labelled = self.alone, self._alone_told()
+        return self._labelled[1]
+
+    def _alone_told(self) -> Bool:
+        """By the nearest Gaussian of the body; where there is none by cut-outs, as far as they are known without."""
+        alone, poses = self.alone, self.scene.poses
+        assert alone is not None
+        if poses is None:
+            return np.zeros(len(alone), bool)
+        if self.body is not None:
+            own = self.body.splats.part(self.body.subject)
+            return np.asarray(self.stands[self.body.subject][cKDTree(own.means).query(alone.means)[1]])
+        first = reference_frame(self.scene)
+        frames = farthest_turned(poses, first)
+        pairs = [(alone, if_still(alone, poses, first, frame)) for frame in frames]
+        targets = [[self._cut_out(key) for key in self._keys(frame) if self.known(key)] for frame in frames]
+        return standing(pairs, targets, alone.means)
+
+    def _cut_out(self, key: Key) -> Target:
+        """A picture whose matte is known without Gaussians, with the subject cut out of it."""
+        photo, opacity, plate = _values(self._frames.image(*key)), _values(self._plain(key).opacity), None
+        if self._plates is not None and self._plated(key):
+            plate = _values(self._plates.image(key[0], 0))
+        colours = np.asarray(cut_from(photo, opacity, plate), np.float32)
+        return target_of(self.scene.camera_in_head(*key), colours, opacity, 1.0)
+
+    def _keys(self, frame: int) -> list[Key]:
+        """Some pictures of a frame, of training cameras."""
+        keys = [(i, frame) for i in self.scene.indices("train") if (i, frame) in self._frames]
+        return spread(keys, LOOKED_AT)
+
+    def _in_frame(self, splats: Splats, stands: Bool, first: int, frame: int) -> Splats:
+        poses = self.scene.poses
+        return splats if poses is None else in_frame(splats, stands, poses, first, frame)
 
     def _view(self, key: Key) -> Key:
         """Which pictures show the subject from the same place: all of a camera, but of a head that turns."""
@@ -152,7 +236,8 @@ class Mattes:
         same = self._view(key)
         if self._drawn is None or self._drawn[0] != same:
             body, room = self.body, self.scene.camera_in_head(key[0], self.body.frame)
-            seen = opacity_of(body.splats, body.subject, self.scene.camera_in_head(*key))
+            there = self._in_frame(body.splats, self.stands, body.frame, key[1])
+            seen = opacity_of(there, body.subject, self.scene.camera_in_head(*key))
             self._drawn = same, (seen, background(body.splats, body.subject, room))
         return self._drawn[1]
 
@@ -198,6 +283,10 @@ def _voted(splats: Splats, cuts: list[tuple[Camera, Bool]], share: float) -> Boo
         seen += there
         inside[there] += cut[y, x]
     return np.asarray((seen > 0) & (inside >= share * seen))
+
+
+def _values(image: Image) -> Array:
+    return np.asarray(image / np.float32(255), np.float32)
 
 
 def _bytes(opacity: Array) -> Image:

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.subject.drawing import draw, view_of
-from facefolds_core.subject.foreign import moved
-from facefolds_core.subject.frames import RIDE, changed_to, mean_errors, ridden, standing, targets_of
+from facefolds_core.subject.frames import RIDE, changed_to, mean_errors, ridden, targets_of
 from facefolds_core.subject.splats import COLOUR, MEAN, Splats
 from tests.scenes import look_at_origin
 from tests.subject.splats import some_splats
@@ -56,16 +54,3 @@ def test_gaussians_ride_on_the_nearest_vertex_and_what_is_far_off_stays() -> Non
     moved = ridden(splats, vertices, np.array([[0, 0, 0.1], [1.2, 0, 0]]))
     np.testing.assert_allclose(moved.means - splats.means, [[0, 0, 0.1], [0.1, 0, 0], [0, 0, 0]], atol=1e-6)
     np.testing.assert_array_equal(moved.values[:, MEAN.stop :], splats.values[:, MEAN.stop :])
-
-
-def test_what_stands_still_while_the_head_turns_is_told_from_the_head() -> None:
-    """The lower half stays in the room: in the head's own frame it moves."""
-    splats = some()
-    turn = Similarity(1.0, np.array([[0.98, -0.199, 0], [0.199, 0.98, 0], [0, 0, 1]]), np.array([0.02, 0.05, 0]))
-    other, lower = moved(splats, turn), splats.means[:, 2] < 0
-    now = Splats(np.where(lower[:, None], other.values, splats.values), splats.background)
-    stands = standing(splats, other, targets_of(CAMERAS, cut_out(now))) > 0
-    sure = np.abs(splats.means[:, 2]) > 0.15
-    assert (stands == lower)[sure].mean() > 0.95
-    rigid = standing(splats, other, targets_of(CAMERAS, cut_out(splats))) > 0
-    assert rigid.mean() < 0.02

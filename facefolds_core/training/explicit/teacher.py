@@ -17,11 +17,12 @@ from numpy.typing import NDArray
 
 from facefolds_core.captures.scene import Scene
 from facefolds_core.geometry.cameras import Camera
+from facefolds_core.geometry.track import Track
 from facefolds_core.subject.drawing import draw, view_of
-from facefolds_core.subject.foreign import moved as turned
 from facefolds_core.subject.found import reference_frame
-from facefolds_core.subject.frames import changed_to, mean_errors, ridden, standing, targets_of
+from facefolds_core.subject.frames import changed_to, mean_errors, ridden, targets_of
 from facefolds_core.subject.splats import Splats
+from facefolds_core.subject.standing import farthest_turned, if_still, standing
 from facefolds_core.subject.storage import FoundSubject
 from facefolds_core.subject.virtual import seen_by_few, virtual_cameras
 from facefolds_core.training.explicit.warnings import MIN_START_PSNR
@@ -88,21 +89,25 @@ class Teacher:
             return []
         chosen = farthest_first(comparable(likenesses(self._scene)), 1 + OTHERS, self._first)
         others = [frame for frame in chosen if frame != self._first]
+        if not others:
+            return []
         surface = self._scene.load_surface()
         if surface is not None and all(self._rides(surface[0], frame, photos) for frame in others):
             self._mesh = surface[0]
         if self._scene.poses is not None:
-            self._stand = np.mean([self._standing(frame, photos) for frame in others], 0) > 0
+            self._stand = self._standing(self._scene.poses, photos)
         return [self._at(frame, photos) for frame in others]
 
     def moved(self, frame: int) -> Splats | None:
         """The Gaussians of a frame as the tracked mesh says, but for those that stand still while the head turns; None
         where they are those of the start, or nothing says where they are."""
+        poses, found = self._scene.poses, self._turning(frame)
         if frame == self._first or (self._mesh is None and not self._stand.any()):
             return None
-        found = self._splats if self._mesh is None else self._ridden(self._mesh, frame)
-        where = self._stand[:, None]
-        return replace(found, values=np.where(where, self._still(frame).values, found.values)) if where.any() else found
+        if poses is None or not self._stand.any():
+            return found
+        still = if_still(self._splats, poses, self._first, frame)
+        return replace(found, values=np.where(self._stand[:, None], still.values, found.values))
 
     def cut(self, frame: int, photos: Callable[[int], Image]) -> Image:
         """(V, H W, 4) RGBA of a frame, colours times opacity.
@@ -127,14 +132,15 @@ class Teacher:
         start, now = (mesh[k].astype(np.float64) for k in (self._first, frame))
         return ridden(self._splats, start, now)
 
-    def _still(self, frame: int) -> Splats:
-        """Where they are in the head's own frame if they stay in the room where they were in the frame of the start."""
-        poses = self._scene.poses
-        assert poses is not None
-        return turned(self._splats, poses.at(frame).inverse().after(poses.at(self._first)))
+    def _turning(self, frame: int) -> Splats:
+        """All Gaussians of a frame as they move with the head."""
+        return self._splats if self._mesh is None else self._ridden(self._mesh, frame)
 
-    def _standing(self, frame: int, photos: Callable[[int], Image]) -> NDArray[np.float32]:
-        return standing(self._splats, self._still(frame), targets_of(self._real(frame), photos(frame)))
+    def _standing(self, poses: Track, photos: Callable[[int], Image]) -> NDArray[np.bool_]:
+        """(N,) those that stand still while the head turns."""
+        frames = farthest_turned(poses, self._first)
+        pairs = [(self._turning(k), if_still(self._splats, poses, self._first, k)) for k in frames]
+        return standing(pairs, [targets_of(self._real(k), photos(k)) for k in frames], self._splats.means)
 
     def _rides(self, mesh: NDArray[np.float32], frame: int, photos: Callable[[int], Image]) -> bool:
         """Whether Gaussians that ride on the mesh (K, V, 3) explain the photos of a frame better."""
