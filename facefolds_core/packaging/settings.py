@@ -14,9 +14,9 @@ from facefolds_core.params import CompressParams, LevelParams
 MOST_BITS = 20
 
 HIDDEN = 10.0
-"""An error so many dB below the model's own is not seen by scores on photos it was not trained with: much of what it
-takes is noise. 10 instead of 14 take half of the bytes of a capture with 25 dB, for 0.04 dB over any background, and a
-third of `sparse`'s (27 dB), for 0.00."""
+"""An error so many dB below the model's own is hardly seen by scores on photos it was not trained with: much of what it
+takes is noise. 10 instead of 14 save half of the bytes of a capture with 25 dB, for 0.06 dB inside, and a third of
+`sparse`'s (27 dB), for 0.05."""
 
 LEAST_QUALITY = 36.0
 """But no target is lowered below this, dB: blocks would show, however bad the model is."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import subprocess
 from pathlib import Path
 
@@ -22,6 +23,7 @@ from docs.tools.site import (
 )
 from facefolds_core.errors import UserError
 from tests.assets import make_asset
+from tests.viewer.fixtures import rich_asset
 
 
 @pytest.mark.parametrize(
@@ -106,6 +108,9 @@ def test_a_hero_with_photos_is_held_against_one(tmp_path: Path) -> None:
     make_asset((tmp_path / HERO).parent / "asset", frames=1)
     (tmp_path / HERO).write_text("the hero")
     assert not has_photos(tmp_path)
+    shutil.rmtree((tmp_path / HERO).parent / "asset")
+    rich_asset((tmp_path / HERO).parent / "asset")
+    assert has_photos(tmp_path)
     assert "hero.html#photo=0" in first_page("![x](y)", True, photos=True)
     assert "hero.html#photo=0" not in first_page("![x](y)", True)
 
