@@ -114,7 +114,8 @@ class Subject(Overrides):
 
     start: str | None = None
     """A PLY file of Gaussians (3DGS, as gsplat, nerfstudio, OpenSplat and Postshot write it) in the capture's
-    coordinates, of the middle frame. They take the place of those that the stage `subject` fits."""
+    coordinates, of the middle frame, or of that nearest a turning head's mean pose. They take
+    the place of those that the stage `subject` fits."""
 
     krt_size: Pair[Count] | None = None
     """[width, height], pixels, of the images that KRT refers to; null finds out."""

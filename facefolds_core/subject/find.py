@@ -83,9 +83,10 @@ def find_subject(
     """
     store, how, mattes, begun = scene.open_frames(), gaussian_params(params, scene), Mattes(scene, named), None
     keys = [(c, k) for k in frames_looked_at(scene) for c in scene.indices("train") if (c, k) in store]
-    if start is not None or not all(mattes.known(key) for key in keys):
-        body = _body(scene, how, params.seed, start)
-        mattes, begun = Mattes(scene, named, body), body.splats.part(body.subject)
+    training = set(scene.indices("train"))
+    if start is not None or not all(mattes.known(key) for key in store if key[0] in training):
+        mattes = Mattes(scene, named, _body(scene, how, params.seed, start))
+        begun = mattes.begun()
     views = [view_cut_out(scene, mattes, key) for key in _agreeing(scene, mattes, keys)]
     if not any((view.opacity > 0.5).any() for view in views):
         raise _nothing(scene)
@@ -102,11 +103,10 @@ def find_subject(
 
 
 def _agreeing(scene: Scene, mattes: Mattes, keys: Sequence[Key]) -> list[Key]:
-    """The pictures that one body can show: of one frame, where a part of it is known to stand still while the rest
-    turns."""
+    """The pictures that one body can show: of one frame, where a part of it stands still while the rest turns, or
+    where that is not known yet."""
     told = mattes.body is not None or mattes.alone is not None
-    several = len({frame for _, frame in keys}) > 1
-    if not (told and several and mattes.anything_stands):
+    if len({frame for _, frame in keys}) < 2 or (told and not mattes.anything_stands):
         return list(keys)
     return [key for key in keys if key[1] == reference_frame(scene)]
 

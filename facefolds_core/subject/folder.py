@@ -58,9 +58,10 @@ def make_folder(
 def _rows(
     scene: Scene, mattes: Mattes, folder: Path, told: list[Told], tiles: dict[Key, Image]
 ) -> Iterator[tuple[int, int, Image]]:
-    """Mattes of all pictures; `told` and `tiles` grow with them."""
+    """Mattes of all pictures, but of held-out ones where they are not given, as others are; `told` and `tiles` grow
+    with them."""
     store, masks = scene.open_frames(), scene.open_masks()
-    keys = sorted(store)
+    keys = [key for key in sorted(store) if mattes.body is not None or mattes.known(key)]
     shown, doubtful = set(spread(keys, MOST)), list[Key]()
     with progress(total=len(keys), desc="mattes", unit="picture") as bar:
         for key in keys:

@@ -40,12 +40,14 @@ def _product(q: NDArray[np.float64], others: NDArray[np.float64]) -> NDArray[np.
 
 
 def read_start(path: str | Path, scene: Scene, frame: int = 0) -> Splats:
-    """Gaussians of a file in the capture's coordinates, in those of the scene.
+    """Gaussians of a file in the capture's coordinates, in the head's own frame in the scene.
 
     Raises:
         UserError: of `read_ply`; if they do not show what the training pictures of the frame show.
     """
     splats = moved(read_ply(path), scene.from_capture)
+    if scene.poses is not None:
+        splats = moved(splats, scene.poses.at(frame).inverse())
     store = scene.open_frames()
     there = spread([i for i in scene.indices("train") if (i, frame) in store], LOOKED_AT)
     found = list[float]()

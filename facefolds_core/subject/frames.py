@@ -44,7 +44,9 @@ def shown_errors(splats: Splats, targets: Sequence[Target]) -> tuple[Array, Arra
             error = np.abs(drawing.rgb + behind - target.picture).mean(0)
         else:
             error = np.abs(drawing.rgb - target.picture).mean(0) + np.abs(1 - drawing.light - target.opacity)
-        wish = np.stack([error, np.ones_like(error), np.zeros_like(error)])
+        inside, (width, height) = np.zeros_like(error), target.view.size
+        inside[:height, :width] = 1  # tiles reach beyond the picture
+        wish = np.stack([error * inside, inside, np.zeros_like(error)])
         gradient, _ = differentiate(splats.values, drawing, wish, np.zeros_like(error))
         sums += gradient[:, COLOUR][:, 0]
         weights += gradient[:, COLOUR][:, 1]

@@ -179,6 +179,12 @@ class Mattes:
             targets.append([target_of(camera, _values(photo), None, 1.0) for camera, photo in seen])
         return ~body.subject | standing(pairs, targets, body.splats.means, body.subject)
 
+    def begun(self) -> Splats:
+        """The body's own Gaussians, in the reference frame: what stands still is elsewhere than when it was found."""
+        assert self.body is not None
+        body, first = self.body, reference_frame(self.scene)
+        return self._in_frame(body.splats, self.stands, body.frame, first).part(body.subject)
+
     @property
     def anything_stands(self) -> bool:
         """Whether a part of the subject stands still while the head turns."""
@@ -200,8 +206,7 @@ class Mattes:
         if poses is None:
             return np.zeros(len(alone), bool)
         if self.body is not None:
-            own = self.body.splats.part(self.body.subject)
-            return np.asarray(self.stands[self.body.subject][cKDTree(own.means).query(alone.means)[1]])
+            return np.asarray(self.stands[self.body.subject][cKDTree(self.begun().means).query(alone.means)[1]])
         first = reference_frame(self.scene)
         frames = farthest_turned(poses, first)
         pairs = [(alone, if_still(alone, poses, first, frame)) for frame in frames]

@@ -25,20 +25,27 @@ Bool = NDArray[np.bool_]
 
 NEIGHBOURS = 64
 """Gaussians decide together with so many others."""
+NOTHING = 1e-3
+"""Frames that differ by less, radians and units, tell nothing."""
 LESS = 0.02
 """By so much less must they err if they stand still, mean of colours in [0, 1]. On `glasses` shoulders have 0.1, a face
 -0.25."""
 FRAMES = 2
-"""In which it is looked."""
+"""In which it is looked; they must agree."""
+SHARE = 0.02
+"""Of the Gaussians that are asked: where fewer stand, none does."""
 
 
 def farthest_turned(poses: Track, first: int) -> list[int]:
-    """Up to `FRAMES` frames that differ in the head's turn most from the first and from one another."""
+    """Up to `FRAMES` frames that differ most from the first and from one another: by the head's turn, radians, and its
+    shift, units."""
     chosen = [first]
     for _ in range(FRAMES):
-        cosines = np.abs(poses.quaternions @ poses.quaternions[chosen].T).max(1)
-        farthest = int(cosines.argmin())
-        if farthest in chosen:
+        turns = 2 * np.arccos(np.abs(poses.quaternions @ poses.quaternions[chosen].T).clip(0, 1))
+        shifts = np.linalg.norm(poses.translations[:, None] - poses.translations[chosen], axis=-1)
+        away = (turns + shifts).min(1)
+        farthest = int(away.argmax())
+        if farthest in chosen or away[farthest] < NOTHING:
             break
         chosen.append(farthest)
     return chosen[1:]
@@ -60,7 +67,7 @@ def in_frame(splats: Splats, stands: Bool, poses: Track, first: int, frame: int)
 def standing(
     pairs: Sequence[tuple[Splats, Splats]], targets: Sequence[Sequence[Target]], means: Array, asked: Bool | None = None
 ) -> Bool:
-    """(N,) Gaussians that err less if they stand still, mean over the frames and over their neighbours.
+    """(N,) Gaussians that err less if they stand still, mean over their neighbours, in each frame that shows them.
 
     Args:
         pairs: of each frame the Gaussians as they move with the head, and as they stand still.
@@ -69,15 +76,14 @@ def standing(
         asked: (N,) which may stand; others do not count, but are drawn. None: all.
     """
     asked = np.ones(len(means), bool) if asked is None else asked
-    total, known = np.zeros(len(means)), np.zeros(len(means))
+    stands, told = asked.copy(), False
     for (turning, still), pictures in zip(pairs, targets, strict=True):
         (a, shown_a), (b, shown_b) = (shown_errors(one, pictures) for one in (turning, still))
-        both = asked & (shown_a > 0) & (shown_b > 0)  # what no picture shows errs nowhere
-        less = a[both] / shown_a[both] - b[both] / shown_b[both]
-        total[both], known[both] = total[both] + less, known[both] + 1
-    if not known.any():
-        return np.zeros(len(means), bool)
-    there = np.flatnonzero(known)
-    _, near = cKDTree(means[there]).query(means, min(NEIGHBOURS, len(there)))
-    mean = (total[there] / known[there])[near].reshape(len(means), -1).mean(1)
-    return np.asarray(asked & (mean > LESS))
+        there = np.flatnonzero(asked & (shown_a > 0) & (shown_b > 0))  # what no picture shows errs nowhere
+        if not len(there):
+            continue
+        less = a[there] / shown_a[there] - b[there] / shown_b[there]
+        _, near = cKDTree(means[there]).query(means, min(NEIGHBOURS, len(there)))
+        stands &= less[near].reshape(len(means), -1).mean(1) > LESS
+        told = True
+    return np.asarray(stands & (told and stands.sum() >= SHARE * asked.sum()))

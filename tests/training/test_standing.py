@@ -80,6 +80,8 @@ def test_frames_that_turn_farthest_are_looked_at() -> None:
         turns.append(np.array([[np.cos(a), -np.sin(a), 0], [np.sin(a), np.cos(a), 0], [0, 0, 1]]))
     assert farthest_turned(Track.of(turns, np.zeros((5, 3))), 0) == [2, 3]
     assert farthest_turned(Track.of(turns[:1], np.zeros((1, 3))), 0) == []
+    assert farthest_turned(Track.of(turns[:1] * 3, np.zeros((3, 3))), 1) == []
+    assert farthest_turned(Track.of(turns[:1] * 3, [[0, 0, 0], [0.1, 0, 0], [0.3, 0, 0]]), 0) == [2, 1]
 
 
 @pytest.fixture
@@ -134,6 +136,23 @@ def test_mattes_of_other_frames_know_what_stands(scene: Scene) -> None:
     assert given.anything_stands
     still = Mattes(replace(scene, poses=None), body=Body(splats, np.ones(300, bool), 0))
     assert not still.anything_stands
+
+
+def test_a_body_of_another_frame_begins_where_it_stands_in_the_reference_frame(scene: Scene) -> None:
+    """Poses may be found after it."""
+    splats = some()
+    lower = splats.means[:, 2] < 0
+    later = in_frame(splats, lower, POSES, 0, 1)
+    begun = Mattes(scene, body=Body(later, np.ones(300, bool), 1)).begun()
+    off = [np.linalg.norm(one.means - splats.means, axis=1)[lower].mean() for one in (begun, later)]
+    assert off[0] < 0.35 * off[1]
+
+
+def test_a_few_that_seem_to_stand_do_not() -> None:
+    splats = some()
+    few = np.argsort(splats.means[:, 2]) < 0
+    few[np.argsort(splats.means[:, 2])[:3]] = True
+    assert not told(splats, in_frame(splats, few, POSES, 0, 1)).any()
 
 
 def test_a_frame_begins_with_colours_of_its_own_and_keeps_them_where_layers_move() -> None:
