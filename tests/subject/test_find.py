@@ -89,6 +89,15 @@ def test_what_is_written_can_be_looked_at_and_corrected(scene: Scene, folders: S
     assert (folders.subject / "sheet.png").is_file()
 
 
+def test_mattes_of_the_training_cameras_are_enough(tmp_path: Path) -> None:
+    scene = make_scene(tmp_path / "scene", size=SIZE)
+    full = np.full((SIZE, SIZE, 1), 255, np.uint8)
+    keys = [(i, k) for i in scene.indices("train") for k in range(scene.num_frames)]
+    write_frames(scene.folder / "mattes.arrow", (SIZE, SIZE, 1), [(*key, full) for key in keys])
+    _, told = make_folder(scene, tmp_path / "subject", PARAMS)
+    assert {one["camera"] for one in told} == {scene.cameras[i].name for i in scene.indices("train")}
+
+
 @pytest.mark.parametrize("place", ["nowhere", "empty"])
 def test_a_folder_without_mattes_is_refused(scene: Scene, folders: SubjectFolders, tmp_path: Path, place: str) -> None:
     (tmp_path / "empty").mkdir()

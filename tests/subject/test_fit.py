@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,7 @@ from facefolds_core.captures.scene import Scene, write_scene
 from facefolds_core.errors import UserError
 from facefolds_core.files.frame_store import write_frames
 from facefolds_core.geometry.similarity import Similarity
-from facefolds_core.geometry.track import rotation
+from facefolds_core.geometry.track import Track, rotation
 from facefolds_core.subject import mattes as mattes_module
 from facefolds_core.subject.cut_out import EdgeParams, agreement
 from facefolds_core.subject.drawing import render
@@ -203,3 +204,15 @@ def test_a_file_of_another_program(scene: Scene, splats: Splats, tmp_path: Path)
     write_ply(tmp_path / "b.ply", opaque)  # in the scene's coordinates, not in the capture's
     with pytest.raises(UserError, match="do not show"):
         read_start(tmp_path / "b.ply", scene)
+
+
+def test_a_file_of_another_program_is_brought_into_a_turning_heads_own_frame(
+    scene: Scene, splats: Splats, tmp_path: Path
+) -> None:
+    c, s = np.cos(0.2), np.sin(0.2)
+    turn = Track.of([[[c, -s, 0], [s, c, 0], [0, 0, 1]]], [[0.02, 0.05, 0]])
+    opaque, turned = Splats(splats.values, np.zeros(3, np.float32)), replace(scene, poses=turn)
+    write_ply(tmp_path / "a.ply", moved(opaque, scene.from_capture.inverse()))
+    found = read_start(tmp_path / "a.ply", turned)
+    seen = render(found, turned.camera_in_head(0, 0))[0]
+    np.testing.assert_allclose(seen, render(opaque, scene.cameras[0])[0], atol=5e-3)
