@@ -22,6 +22,7 @@ from facefolds_core.files.paths import SubjectFolders
 from facefolds_core.files.writing import write_text
 from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.packaging.poster import BACKGROUND
+from facefolds_core.packaging.settings import LEAST_QUALITY
 from facefolds_core.params import CompressParams, merged
 from facefolds_core.pipeline.compress import compress
 from tests.assets import CENTRE, PLAIN, WINDOW, cap_crops, cap_mesh, cap_textures, radius_of, write_store
@@ -74,7 +75,7 @@ def rig(folders: SubjectFolders, **params: object) -> None:
 
 def test_quality_by_target(folders: SubjectFolders) -> None:
     sizes, qualities = [], []
-    for target in (30.0, 38.0):
+    for target in (30.0, LEAST_QUALITY):
         rig(folders, video={"target_psnr": target, "codec": ["h264", "vp9"], "preset": "veryfast"})
         compress(folders)
         assert validate_asset(folders.asset) == []
