@@ -42,7 +42,7 @@ from facefolds_core.subject.found import (
 )
 from facefolds_core.subject.plates import Start, from_plate
 from facefolds_core.subject.splats import Splats
-from facefolds_core.subject.standing import farthest_turned, if_still, in_frame, standing
+from facefolds_core.subject.standing import farthest_moved, if_still, in_frame, standing
 from facefolds_core.subject.storage import Body
 
 Image = NDArray[np.uint8]
@@ -172,7 +172,7 @@ class Mattes:
         if poses is None:
             return np.zeros(len(body.splats), bool)
         pairs, targets = [], []
-        for frame in farthest_turned(poses, body.frame):
+        for frame in farthest_moved(poses, body.frame):
             still = if_still(body.splats, poses, body.frame, frame)
             pairs.append((in_frame(body.splats, ~body.subject, poses, body.frame, frame), still))
             seen = [(self.scene.camera_in_head(*key), self._frames.image(*key)) for key in self._keys(frame)]
@@ -208,7 +208,7 @@ class Mattes:
         if self.body is not None:
             return np.asarray(self.stands[self.body.subject][cKDTree(self.begun().means).query(alone.means)[1]])
         first = reference_frame(self.scene)
-        frames = farthest_turned(poses, first)
+        frames = farthest_moved(poses, first)
         pairs = [(alone, if_still(alone, poses, first, frame)) for frame in frames]
         targets = [[self._cut_out(key) for key in self._keys(frame) if self.known(key)] for frame in frames]
         return standing(pairs, targets, alone.means)

@@ -36,7 +36,7 @@ SHARE = 0.02
 """Of the Gaussians that are asked: where fewer stand, none does."""
 
 
-def farthest_turned(poses: Track, first: int) -> list[int]:
+def farthest_moved(poses: Track, first: int) -> list[int]:
     """Up to `FRAMES` frames that differ most from the first and from one another: by the head's turn, radians, and its
     shift, units."""
     chosen = [first]
@@ -56,12 +56,19 @@ def if_still(splats: Splats, poses: Track, first: int, frame: int) -> Splats:
     return moved(splats, poses.at(frame).inverse().after(poses.at(first)))
 
 
-def in_frame(splats: Splats, stands: Bool, poses: Track, first: int, frame: int) -> Splats:
-    """Gaussians of the frame `first` in another, in the head's own frame: those that stand (N,) stay in the room."""
+def in_frame(
+    splats: Splats, stands: Bool, poses: Track, first: int, frame: int, turning: Splats | None = None
+) -> Splats:
+    """Gaussians of the frame `first` in another, in the head's own frame: those that stand (N,) stay in the room.
+
+    Args:
+        turning: all of them as they move with the head, where a tracked mesh says more than the poses do.
+    """
+    turning = splats if turning is None else turning
     if frame == first or not stands.any():
-        return splats
+        return turning
     still = if_still(splats, poses, first, frame)
-    return replace(splats, values=np.where(stands[:, None], still.values, splats.values))
+    return replace(splats, values=np.where(stands[:, None], still.values, turning.values))
 
 
 def standing(

@@ -20,7 +20,7 @@ from facefolds_core.subject.foreign import moved
 from facefolds_core.subject.frames import targets_of
 from facefolds_core.subject.mattes import Mattes
 from facefolds_core.subject.splats import OPACITY, Splats
-from facefolds_core.subject.standing import farthest_turned, if_still, in_frame, standing
+from facefolds_core.subject.standing import farthest_moved, if_still, in_frame, standing
 from facefolds_core.subject.storage import Body
 from facefolds_core.training.explicit.state import TextureState
 from facefolds_core.training.explicit.teacher import Teacher
@@ -78,10 +78,10 @@ def test_frames_that_turn_farthest_are_looked_at() -> None:
     for degrees in (5, 20, -15, 19):
         a = np.radians(degrees)
         turns.append(np.array([[np.cos(a), -np.sin(a), 0], [np.sin(a), np.cos(a), 0], [0, 0, 1]]))
-    assert farthest_turned(Track.of(turns, np.zeros((5, 3))), 0) == [2, 3]
-    assert farthest_turned(Track.of(turns[:1], np.zeros((1, 3))), 0) == []
-    assert farthest_turned(Track.of(turns[:1] * 3, np.zeros((3, 3))), 1) == []
-    assert farthest_turned(Track.of(turns[:1] * 3, [[0, 0, 0], [0.1, 0, 0], [0.3, 0, 0]]), 0) == [2, 1]
+    assert farthest_moved(Track.of(turns, np.zeros((5, 3))), 0) == [2, 3]
+    assert farthest_moved(Track.of(turns[:1], np.zeros((1, 3))), 0) == []
+    assert farthest_moved(Track.of(turns[:1] * 3, np.zeros((3, 3))), 1) == []
+    assert farthest_moved(Track.of(turns[:1] * 3, [[0, 0, 0], [0.1, 0, 0], [0.3, 0, 0]]), 0) == [2, 1]
 
 
 @pytest.fixture

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +22,7 @@ from facefolds_core.subject.drawing import draw, view_of
 from facefolds_core.subject.found import reference_frame
 from facefolds_core.subject.frames import changed_to, mean_errors, ridden, targets_of
 from facefolds_core.subject.splats import Splats
-from facefolds_core.subject.standing import farthest_turned, if_still, standing
+from facefolds_core.subject.standing import farthest_moved, if_still, in_frame, standing
 from facefolds_core.subject.storage import FoundSubject
 from facefolds_core.subject.virtual import seen_by_few, virtual_cameras
 from facefolds_core.training.explicit.warnings import MIN_START_PSNR
@@ -101,13 +101,10 @@ class Teacher:
     def moved(self, frame: int) -> Splats | None:
         """The Gaussians of a frame as the tracked mesh says, but for those that stand still while the head turns; None
         where they are those of the start, or nothing says where they are."""
-        poses, found = self._scene.poses, self._turning(frame)
         if frame == self._first or (self._mesh is None and not self._stand.any()):
             return None
-        if poses is None or not self._stand.any():
-            return found
-        still = if_still(self._splats, poses, self._first, frame)
-        return replace(found, values=np.where(self._stand[:, None], still.values, found.values))
+        poses, turning = self._scene.poses, self._turning(frame)
+        return turning if poses is None else in_frame(self._splats, self._stand, poses, self._first, frame, turning)
 
     def cut(self, frame: int, photos: Callable[[int], Image]) -> Image:
         """(V, H W, 4) RGBA of a frame, colours times opacity.
@@ -138,7 +135,7 @@ class Teacher:
 
     def _standing(self, poses: Track, photos: Callable[[int], Image]) -> NDArray[np.bool_]:
         """(N,) those that stand still while the head turns."""
-        frames = farthest_turned(poses, self._first)
+        frames = farthest_moved(poses, self._first)
         pairs = [(self._turning(k), if_still(self._splats, poses, self._first, k)) for k in frames]
         return standing(pairs, [targets_of(self._real(k), photos(k)) for k in frames], self._splats.means)
 
