@@ -7,10 +7,7 @@ FFmpeg's own threads. Memory holds a few pictures a core, however long the captu
 from __future__ import annotations
 
 import itertools
-import os
-from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import lru_cache, partial
 
@@ -24,6 +21,7 @@ from facefolds_core.captures.picture import Picture, VideoFrame
 from facefolds_core.captures.videos import Channels, Video
 from facefolds_core.files.frame_store import Image
 from facefolds_core.params import NormalizeParams
+from facefolds_core.system.threads import in_order
 
 
 @dataclass(frozen=True)
@@ -110,7 +108,7 @@ def _developed(
             for negative, photo in zip(wanted, video.frames(indices, channels, threads=0, fine=fine), strict=True):
                 yield partial(develop, negative, photo)
 
-    return _in_order(work(), os.cpu_count() or 1)
+    return in_order(work())
 
 
 def _video_of(negative: Negative) -> Video | None:
@@ -121,19 +119,3 @@ def _video_of(negative: Negative) -> Video | None:
 def _maps(lens: Lens, width: int, height: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """`Lens.maps`, kept while the frames of a camera are read."""
     return lens.maps(width, height)
-
-
-def _in_order(work: Iterator[Callable[[], Row]], cores: int) -> Iterator[Row]:
-    """What functions return, on several threads, in order, two a core ahead."""
-    with ThreadPoolExecutor(cores) as pool:
-        waiting: deque[Future[Row]] = deque()
-        try:
-            for function in work:
-                waiting.append(pool.submit(function))
-                if len(waiting) > 2 * cores:
-                    yield waiting.popleft().result()
-            while waiting:
-                yield waiting.popleft().result()
-        finally:
-            for future in waiting:
-                future.cancel()

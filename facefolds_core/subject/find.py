@@ -179,7 +179,7 @@ def found_in(scene: Scene, params: SubjectParams, folder: Path) -> Scene:
         write_found(temporary / GAUSSIANS, found)
         if not all_mattes(scene):
             keys = sorted(key for key in scene.open_frames() if scene.splits[key[0]] == "train")
-            rows = ((*key, mattes.of(key).opacity[..., None]) for key in keys)
+            rows = ((*key, matte.opacity[..., None]) for key, matte in mattes.each(keys))
             write_frames(temporary / MATTES, (scene.height, scene.width, 1), rows)
     made = folder / MATTES
     return replace(scene, gaussians=folder / GAUSSIANS, mattes=made if made.exists() else scene.mattes)

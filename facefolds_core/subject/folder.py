@@ -64,8 +64,7 @@ def _rows(
     keys = [key for key in sorted(store) if mattes.body is not None or mattes.known(key)]
     shown, doubtful = set(spread(keys, MOST)), list[Key]()
     with progress(total=len(keys), desc="mattes", unit="picture") as bar:
-        for key in keys:
-            matte = mattes.of(key)
+        for key, matte in mattes.each(keys):
             iou = None
             if masks is not None and key in masks:
                 iou = agreement(matte.opacity > 127, masks.image(*key)[..., 0] > 127)

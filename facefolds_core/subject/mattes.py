@@ -3,9 +3,10 @@ the picture's colours say."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
+from threading import RLock
 from typing import Literal
 
 import numpy as np
@@ -44,6 +45,7 @@ from facefolds_core.subject.plates import Start, from_plate
 from facefolds_core.subject.splats import Splats
 from facefolds_core.subject.standing import farthest_moved, if_still, in_frame, standing
 from facefolds_core.subject.storage import Body
+from facefolds_core.system.threads import in_order
 
 Image = NDArray[np.uint8]
 Key = tuple[int, int]
@@ -99,11 +101,21 @@ class Mattes:
         self._drawn: tuple[Key, tuple[Array, Array]] | None = None
         self._drawn_alone: tuple[Splats, Key, Array] | None = None
         self._labelled: tuple[Splats, Bool] | None = None
+        self._drawing = RLock()
+        """Held by the thread that asks Gaussians: their kernels have threads of their own."""
 
     def known(self, key: Key) -> bool:
         """Whether it needs no Gaussians."""
         given = self._given is not None and key in self._given
         return key in self.named or given or self._plated(key)
+
+    def each(self, keys: Iterable[Key]) -> Iterator[tuple[Key, Matte]]:
+        """Of many pictures, in their order, several at a time."""
+
+        def found(key: Key) -> tuple[Key, Matte]:
+            return key, self.of(key)
+
+        return in_order(partial(found, key) for key in keys)
 
     def of(self, key: Key) -> Matte:
         """Of a picture that is there."""
@@ -111,8 +123,7 @@ class Mattes:
             return self._plain(key, self._start)
         picture = self._frames.image(*key)
         assert self.body is not None
-        camera, (start, behind) = self.scene.camera_in_head(*key), self._seen(key)
-        colours = self._colours
+        camera, colours, (start, behind) = self.scene.camera_in_head(*key), self._colours, self._seen(key)
         cut = cut_out(picture, start, camera, colours, self.edge)
         share = agreement(cut, start > 0.5)
         if share < self.edge.asked and self.alone is not None:
@@ -145,7 +156,8 @@ class Mattes:
         """Of the pictures of the body's frame, by the body as it was found."""
         assert self.body is not None
         body = self.body
-        return colours_of(_pictures(self.scene, body.splats, body.frame, body.subject), self.edge)
+        with self._drawing:
+            return colours_of(_pictures(self.scene, body.splats, body.frame, body.subject), self.edge)
 
     def _start(self, key: Key) -> Start | None:
         """What Gaussians say beside a plate, once they are known."""
@@ -157,12 +169,13 @@ class Mattes:
     def _alone_in(self, key: Key) -> Array:
         """(H, W) opacity of the Gaussians that were trained with the subject cut out."""
         assert self.alone is not None
-        known, same = self._drawn_alone, self._view(key)
-        if known is None or known[0] is not self.alone or known[1] != same:
-            there = self._in_frame(self.alone, self._alone_stands(), reference_frame(self.scene), key[1])
-            seen = draw(there.values, view_of(self.scene.camera_in_head(*key))).picture()
-            known = self._drawn_alone = self.alone, same, np.asarray(1 - seen[1])
-        return known[2]
+        with self._drawing:
+            known, same = self._drawn_alone, self._view(key)
+            if known is None or known[0] is not self.alone or known[1] != same:
+                there = self._in_frame(self.alone, self._alone_stands(), reference_frame(self.scene), key[1])
+                seen = draw(there.values, view_of(self.scene.camera_in_head(*key))).picture()
+                known = self._drawn_alone = self.alone, same, np.asarray(1 - seen[1])
+            return known[2]
 
     @cached_property
     def stands(self) -> Bool:
@@ -238,13 +251,14 @@ class Mattes:
         """(H, W) opacity of the subject's Gaussians, and (H, W, 3) what stands behind them: of a head that turns the
         room as it stood when they were fitted."""
         assert self.body is not None
-        same = self._view(key)
-        if self._drawn is None or self._drawn[0] != same:
-            body, room = self.body, self.scene.camera_in_head(key[0], self.body.frame)
-            there = self._in_frame(body.splats, self.stands, body.frame, key[1])
-            seen = opacity_of(there, body.subject, self.scene.camera_in_head(*key))
-            self._drawn = same, (seen, background(body.splats, body.subject, room))
-        return self._drawn[1]
+        with self._drawing:
+            same = self._view(key)
+            if self._drawn is None or self._drawn[0] != same:
+                body, room = self.body, self.scene.camera_in_head(key[0], self.body.frame)
+                there = self._in_frame(body.splats, self.stands, body.frame, key[1])
+                seen = opacity_of(there, body.subject, self.scene.camera_in_head(*key))
+                self._drawn = same, (seen, background(body.splats, body.subject, room))
+            return self._drawn[1]
 
 
 def body_among(scene: Scene, splats: Splats, frame: int, edge: EdgeParams | None = None) -> Body:

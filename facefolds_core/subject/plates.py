@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import cv2
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from facefolds_core.subject.closed_form import closed_form
-from facefolds_core.subject.cut_out import filled, grown
+from facefolds_core.subject.cut_out import around, filled, grown
 from facefolds_core.subject.known_background import PlateParams, opacity_before
 
 Array = NDArray[np.float32]
@@ -20,6 +21,8 @@ FAINT = 0.05
 """Opacity of the Gaussians from which on the subject may be there, whatever the plate says."""
 SOLID, DEEP = 0.95, 2
 """Opacity of the Gaussians, and pixels within where they have it, from which on the subject is surely there."""
+REACH = 4
+"""Deviations of `PlateParams.spread` around the subject that still matter to its blurs."""
 SAME = 3.0
 """Deviations of noise by which a picture may differ from that of the start where nothing has moved."""
 
@@ -93,7 +96,14 @@ def _soft(image: Image, plate: Image, subject: Image, params: PlateParams, start
         unknown |= (start.opacity > FAINT) & (believed[1] > FAINT)
         inside &= ~same | (start.opacity > 0.5)
         inside |= same & (grown((start.opacity < SOLID).astype(np.uint8), DEEP) == 0)
-    colours, room = (part.astype(np.float32) / np.float32(255) for part in (image, plate))
     unknown &= ~inside
-    before = opacity_before(colours, room, inside, unknown, noise, params, believed)
-    return closed_form(colours, inside, unknown, before, np.full(before.shape, params.weight, np.float32))
+    opacity: Array = inside.astype(np.float32)
+    if not unknown.any():
+        return opacity
+    part = around(inside | unknown, math.ceil(REACH * params.spread))
+    colours, room = (one[part].astype(np.float32) / np.float32(255) for one in (image, plate))
+    near = None if believed is None else (believed[0][part], believed[1][part])
+    before = opacity_before(colours, room, inside[part], unknown[part], noise, params, near)
+    weight = np.full(before.shape, params.weight, np.float32)
+    opacity[part] = closed_form(colours, inside[part], unknown[part], before, weight)
+    return opacity

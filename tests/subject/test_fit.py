@@ -175,6 +175,18 @@ def test_a_picture_that_contradicts_the_first_fit_is_asked_of_the_subject_alone(
     assert agreement(before.opacity > 127, true) < agreement(found.opacity > 127, true) > 0.93
 
 
+def test_mattes_of_many_pictures_at_once_are_those_of_one_after_the_other(scene: Scene, splats: Splats) -> None:
+    body, keys = body_among(scene, splats, 0), sorted(scene.open_frames())
+    single, many = Mattes(scene, body=body), Mattes(scene, body=body)
+    single.alone = many.alone = splats.part(body.subject)
+    found = list(many.each(keys))
+    assert [key for key, _ in found] == keys
+    for key, matte in found:
+        expected = single.of(key)
+        assert (matte.source, matte.agreement) == (expected.source, expected.agreement)
+        np.testing.assert_array_equal(matte.opacity, expected.opacity)
+
+
 def cut_outs(scene: Scene) -> tuple[list[np.ndarray], list[np.ndarray]]:
     """Of all cameras, colours times opacity and opacity."""
     pairs = [true_picture(camera, OPAQUE, 0) for camera in scene.cameras]
