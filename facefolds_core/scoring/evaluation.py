@@ -13,17 +13,16 @@ import numpy as np
 from facefolds_core.asset import Asset
 from facefolds_core.captures.scene import Scene, Split
 from facefolds_core.errors import UserError
-from facefolds_core.geometry.cameras import Camera
 from facefolds_core.model import RadianceManifolds
 from facefolds_core.params import EvaluateParams
 from facefolds_core.progress import progress
 from facefolds_core.scoring.films import FilmFile, FilmFolder
 from facefolds_core.scoring.images import Rendering, cutout_of, region_of, score_renderings
 from facefolds_core.scoring.metrics import Array, shown
+from facefolds_core.scoring.model_view import PosedView
 from facefolds_core.scoring.panels import ImageScore, Panel
 from facefolds_core.scoring.patches import WorstPatch, find_patch
 from facefolds_core.scoring.perceptual import Perceptual
-from facefolds_core.scoring.posed import PosedView
 from facefolds_core.scoring.temporal import Change, Film, Sums, change_of
 from facefolds_core.scoring.training_scores import TrainingView
 from facefolds_core.scoring.training_views import training_views
@@ -85,7 +84,7 @@ def evaluate(
         UserError: if there is no held-out camera, the three do not belong together, or a picture has NaN in it.
     """
     _check(scene, model, asset)
-    scorer = _Scorer(scene, model, asset, params, perceptual)
+    scorer = _Scorer(scene, asset, params, perceptual)
     show = _Show(set(spread(range(scene.num_frames), params.sheet_frames)))
     rolls = FilmFolder(films if params.films else None, scene.fps, params.film_crf)
     found, changes = [], {}
@@ -93,7 +92,7 @@ def evaluate(
         for split in SCORED:
             sums = []
             for index in scene.indices(split):
-                film, view = Film(), scorer.view(scene.cameras[index])
+                film, view = Film(), PosedView(scene, model, asset, scene.cameras[index])
                 shown_split = FilmFolder(None, 0, 0) if split == "validate" else rolls
                 with shown_split.roll(scene.cameras[index].name) as roll:
                     for k, shot in scorer.shots(split, index, view):
@@ -153,27 +152,16 @@ class _Scorer:
     """Renders and scores the frames of a camera.
 
     Attributes:
-        keys: (camera, frame) of all photos that are scored.
+        keys: (camera, frame) of all photos that are scored, held-out cameras first.
         kind: which opacity says where the subject is in them.
     """
 
-    def __init__(
-        self,
-        scene: Scene,
-        model: RadianceManifolds,
-        asset: Asset,
-        params: EvaluateParams,
-        perceptual: Perceptual,
-    ) -> None:
-        self._scene, self._model, self._asset = scene, model, asset
-        self._params, self._perceptual = params, perceptual
+    def __init__(self, scene: Scene, asset: Asset, params: EvaluateParams, perceptual: Perceptual) -> None:
+        self._scene, self._asset, self._params, self._perceptual = scene, asset, params, perceptual
         self._truths = Truths(scene)
-        self.keys = scored_keys(scene, self._truths)
+        cameras = [index for split in SCORED for index in scene.indices(split)]
+        self.keys = [(c, k) for c in cameras for k in range(scene.num_frames) if (c, k) in self._truths]
         self.kind = self._truths.matte_kind(self.keys)
-
-    def view(self, camera: Camera) -> PosedView:
-        """Of a camera of the world."""
-        return PosedView(self._scene, self._model, self._asset, camera)
 
     def shots(self, split: Split, index: int, view: PosedView) -> Iterator[tuple[int, _Shot]]:
         """All frames of a camera that have a photo."""
@@ -191,12 +179,6 @@ class _Scorer:
             panel = Panel(camera.name, frame, truth.picture, *both, region, over)
             patch = find_patch(camera.name, frame, renderings["asset"], cutout_of(self.kind, truth))
             yield k, _Shot(panel, patch, list(group.values()), pictures)
-
-
-def scored_keys(scene: Scene, truths: Truths) -> list[tuple[int, int]]:
-    """(camera, frame) of all photos that are scored, held-out cameras first."""
-    cameras = [index for split in SCORED for index in scene.indices(split)]
-    return [(c, k) for c in cameras for k in range(scene.num_frames) if (c, k) in truths]
 
 
 def rendered(view: PosedView, asset: Asset, frames: list[int]) -> Iterator[tuple[int, dict[str, Rendering]]]:

@@ -10,9 +10,8 @@ import torch
 from numpy.typing import ArrayLike, NDArray
 
 from facefolds_core.scoring.backgrounds import Cutout, squared_error, worst_patch
-from facefolds_core.scoring.detail import ssim_high
 from facefolds_core.scoring.matte import Region, interior_and_band, matte_errors, opacity_errors
-from facefolds_core.scoring.metrics import Array, decibels, psnr, shown, ssim
+from facefolds_core.scoring.metrics import Array, decibels, psnr, shown, ssim, ssim_high
 from facefolds_core.scoring.panels import ALL_METRICS, FOUND_METRICS, METRICS, SUBJECT_METRICS
 from facefolds_core.scoring.perceptual import Perceptual, PerceptualDistance
 from facefolds_core.scoring.truths import MatteKind, Truth
@@ -62,18 +61,16 @@ def score_renderings(
     """
     pictures = {variant: shown(one.over(background)) for variant, one in renderings.items()}
     result = score_images(pictures, truth.picture, truth.mask, perceptual)
-    within = (
-        {} if kind == "true" else region_scores(pictures, truth.picture, region_of(kind, truth, renderings), perceptual)
-    )
-    parts = None if truth.mask is None else interior_and_band(truth.mask, band)
     cutout, region = cutout_of(kind, truth), region_of(kind, truth, renderings)
+    within = {} if kind == "true" else region_scores(pictures, truth.picture, region, perceptual)
+    parts = None if truth.mask is None else interior_and_band(truth.mask, band)
     for variant, one in renderings.items():
         values = result[variant]
         values["ssim_high"] = None if region is None else ssim_high(pictures[variant], truth.picture, region)
         if cutout is not None:
             values |= over_any(one, cutout, band)
         if variant in within:
-            values |= dict(zip(FOUND_METRICS, within[variant].values(), strict=True))
+            values |= dict(zip(FOUND_METRICS, within[variant], strict=True))
         over = None if truth.plate is None else shown(one.over(truth.plate))
         if over is not None:
             values |= {"psnr_over_plate": psnr(over, truth.picture), "ssim_over_plate": ssim(over, truth.picture)}
@@ -130,37 +127,31 @@ def score_images(
         truth: (H, W, 3).
         mask: (H, W) opacity of the subject, or None.
     """
-    pictures = list(images.values())
-    lpips = _distances(perceptual.lpips, pictures, truth)
-    st_lpips = _distances(perceptual.st_lpips, pictures, truth)
-    within = region_scores(images, truth, mask, perceptual)
-    result: dict[str, Values] = {}
-    for i, (name, image) in enumerate(images.items()):
-        values: Values = dict.fromkeys(ALL_METRICS)
-        whole = (psnr(image, truth), ssim(image, truth), lpips[i], st_lpips[i])
-        values |= dict(zip(METRICS, whole, strict=True))
+    whole, within = _measured(images, truth, None, perceptual), region_scores(images, truth, mask, perceptual)
+    result = {}
+    for name in images:
+        result[name] = dict.fromkeys(ALL_METRICS) | dict(zip(METRICS, whole[name], strict=True))
         if name in within:
-            values |= dict(zip(SUBJECT_METRICS, within[name].values(), strict=True))
-        result[name] = values
+            result[name] |= dict(zip(SUBJECT_METRICS, within[name], strict=True))
     return result
 
 
 def region_scores(
     images: Mapping[str, Array], truth: Array, region: Array | None, perceptual: Perceptual
-) -> dict[str, Values]:
+) -> dict[str, list[float | None]]:
     """METRICS of each image, weighted with a region (H, W); nothing where there is none, or it is empty."""
+    return {} if region is None or subject_box(region) is None else _measured(images, truth, region, perceptual)
+
+
+def _measured(
+    images: Mapping[str, Array], truth: Array, region: Array | None, perceptual: Perceptual
+) -> dict[str, list[float | None]]:
+    """METRICS of each image; with a region weighted with it, perceptual ones of its box alone."""
     box = None if region is None else subject_box(region)
-    if region is None or box is None:
-        return {}
-    cut = [(image * region[..., None])[box] for image in [truth, *images.values()]]
-    lpips = _distances(perceptual.lpips, cut[1:], cut[0])
-    st_lpips = _distances(perceptual.st_lpips, cut[1:], cut[0])
-    return {
-        name: dict(
-            zip(METRICS, (psnr(image, truth, region), ssim(image, truth, region), lpips[i], st_lpips[i]), strict=True)
-        )
-        for i, (name, image) in enumerate(images.items())
-    }
+    cut = [image if region is None else (image * region[..., None])[box] for image in [truth, *images.values()]]
+    deep = (_distances(metric, cut[1:], cut[0]) for metric in (perceptual.lpips, perceptual.st_lpips))
+    rows = zip(images.items(), *deep, strict=True)
+    return {name: [psnr(image, truth, region), ssim(image, truth, region), *far] for (name, image), *far in rows}
 
 
 def subject_box(mask: Array) -> tuple[slice, slice] | None:

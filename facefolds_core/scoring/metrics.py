@@ -1,4 +1,5 @@
-"""PSNR and SSIM of an image against the truth, over the whole frame or weighted by a mask (docs/reference/metrics.md).
+"""PSNR and SSIM of an image against the truth, over the whole frame or weighted by a mask, and the SSIM of high
+frequencies: how well fine detail is kept (docs/reference/metrics.md).
 
 Images are (H, W, 3) float64 in [0, 1], in stored (sRGB-encoded) values. SSIM is written out here with separable filters
 because torchmetrics' takes seconds an image on a CPU; tests compare the two.
@@ -8,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import correlate1d
+from scipy.ndimage import correlate1d, gaussian_filter
 
 Array = NDArray[np.float64]
 
@@ -19,6 +20,11 @@ WINDOW_RADIUS = 5
 """SSIM's Gaussian window is 11 x 11."""
 WINDOW_SIGMA = 1.5
 SSIM_C1, SSIM_C2 = 0.01**2, 0.03**2
+
+HIGH_SIGMA = 2.0
+"""Pixels, of the Gaussian whose mean is taken away: what is left is finer than about ten pixels."""
+MIDDLE_GREY = 0.5
+"""Put in place of that mean: differences have both signs, and SSIM's luminance term is that of equal greys."""
 
 
 def shown(image: NDArray[np.floating]) -> Array:
@@ -93,3 +99,26 @@ def _smooth(image: Array) -> Array:
     kernel /= kernel.sum()
     rows = correlate1d(image, kernel, 0, mode="mirror")
     return np.asarray(correlate1d(rows, kernel, 1, mode="mirror"))
+
+
+def ssim_high(image: Array, truth: Array, mask: Array | None = None) -> float | None:
+    """Mean SSIM of the pictures less their Gaussian means; with a mask, of m I and m T, weighted by m.
+
+    Args:
+        image, truth: (H, W, 3) in [0, 1].
+        mask: (H, W), m in [0, 1]; None is 1 everywhere.
+
+    Returns:
+        None where the mask is empty.
+    """
+    weight = np.ones(truth.shape[:2]) if mask is None else mask
+    if weight.sum() == 0:
+        return None
+    values = ssim_map(*(high_frequencies(one * weight[..., None]) for one in (image, truth)))
+    return float((weight * values).sum() / weight.sum())
+
+
+def high_frequencies(image: Array) -> Array:
+    """(H, W, 3) less the mean by a Gaussian of HIGH_SIGMA, mirrored at the borders, about MIDDLE_GREY."""
+    low = gaussian_filter(image, (HIGH_SIGMA, HIGH_SIGMA, 0), mode="mirror")
+    return np.asarray(image - low + MIDDLE_GREY)

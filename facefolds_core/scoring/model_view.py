@@ -1,21 +1,24 @@
-"""A trained model seen from one camera, with and without its view branch, in any number of frames."""
+"""What one camera sees of a trained model, with and without its view branch, and of its asset, in any frames."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import nullcontext
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from facefolds_core.asset import Asset
+from facefolds_core.captures.scene import Scene
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.sphere_uv import uv_to_st
 from facefolds_core.model import RadianceManifolds
 from facefolds_core.model.compositing import compositing_weights
 from facefolds_core.model.grids import GridTextures
 from facefolds_core.model.intersection import Crossings
-from facefolds_core.rendering.areas import AreaView
+from facefolds_core.rendering.areas import AreaView, view_of
 from facefolds_core.rendering.pixels import finer, pixel_means
 from facefolds_core.rendering.reference import Hits
 
@@ -125,3 +128,40 @@ def _cross(model: RadianceManifolds, camera: Camera) -> tuple[list[Tensor], Cros
     device = model.centre.device
     rays = [torch.tensor(np.reshape(part, (-1, 3)), dtype=torch.float32, device=device) for part in camera.rays()]
     return rays, model.crossings(*rays)
+
+
+class PosedView:
+    """One camera: looked through once for a head that stands still, else in each frame anew.
+
+    The model stands where the scene's poses say; the asset where its own track does: what ships is scored.
+
+    Args:
+        camera: in the world.
+
+    Attributes:
+        asset: the asset's view, its reflection with it.
+        model: the model's view.
+    """
+
+    def __init__(self, scene: Scene, model: RadianceManifolds, asset: Asset, camera: Camera) -> None:
+        self._poses, self._model, self._files = scene.poses, model, asset
+        self._camera = camera
+        self._turn_model(0)
+        self._turn_asset(0)
+
+    def turn(self, frame: int) -> None:
+        """To a frame of the scene."""
+        if self._poses is not None:
+            self._turn_model(frame)
+        if self._files.track is not None:
+            self._turn_asset(frame)
+
+    def _turn_model(self, frame: int) -> None:
+        camera = self._camera if self._poses is None else self._poses.camera(self._camera, frame)
+        # Without gradients layers are crossed by compiled code: in each frame anew torch's own would take minutes.
+        with nullcontext() if self._poses is None else torch.no_grad():
+            to_room = None if self._poses is None else self._poses.at(frame).rotation
+            self.model = ModelView(self._model, camera, to_room)
+
+    def _turn_asset(self, frame: int) -> None:
+        self.asset = view_of(self._files.full, self._camera, frame)

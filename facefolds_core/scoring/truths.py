@@ -49,10 +49,6 @@ class Truths:
         plate = _picture(self._plates, (camera, 0))
         return Truth(self._photos.image(*key) / 255.0, mask, matte, plate)
 
-    def region(self, kind: MatteKind, camera: int, frame: int) -> Array | None:
-        """(H, W) opacity by which scores of this kind go; None where there is none: `found` is the model's."""
-        return _opacity({"true": self._masks, "scene": self._mattes}.get(kind), (camera, frame))
-
     def matte_kind(self, keys: Sequence[tuple[int, int]]) -> MatteKind:
         """Which opacity the scores of these (camera, frame) go by: one for all, so that no mean mixes two."""
         if self._masks is not None and any(key in self._masks for key in keys):

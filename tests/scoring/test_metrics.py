@@ -10,8 +10,7 @@ import pytest
 import torch
 from torchmetrics.functional.image import peak_signal_noise_ratio, structural_similarity_index_measure
 
-from facefolds_core.scoring.detail import ssim_high
-from facefolds_core.scoring.metrics import MAX_PSNR, psnr, shown, ssim, ssim_map
+from facefolds_core.scoring.metrics import MAX_PSNR, psnr, shown, ssim, ssim_high, ssim_map
 
 
 def pair(height: int = 24, width: int = 31, noise: float = 0.1) -> tuple[np.ndarray, np.ndarray]:
