@@ -8,7 +8,7 @@ from facefolds_core.asset import Asset, read_asset
 from facefolds_core.captures.found_scene import found_scene
 from facefolds_core.captures.scene import Scene
 from facefolds_core.config.stages import read_stage, read_train
-from facefolds_core.facts import Fact
+from facefolds_core.facts import Fact, fact
 from facefolds_core.files.paths import SubjectFolders
 from facefolds_core.files.writing import atomic_folder, write_json
 from facefolds_core.model import load_model
@@ -24,7 +24,7 @@ from facefolds_core.scoring.report import Circumstances, metrics_json, read_cost
 from facefolds_core.scoring.sheets import write_contact_sheet
 from facefolds_core.scoring.terminal import result_lines, score_lines
 from facefolds_core.scoring.training_scores import bad_views, warnings_of
-from facefolds_core.scoring.warnings import matte_is_found, stands_still, training_events, warnings_among
+from facefolds_core.scoring.warnings import stands_still, training_events, warnings_among
 
 
 def noticed(folders: SubjectFolders, scene: Scene, asset: Asset, result: Evaluation) -> tuple[Fact, ...]:
@@ -36,7 +36,7 @@ def noticed(folders: SubjectFolders, scene: Scene, asset: Asset, result: Evaluat
             *scene.left_out,
             *training_events(folders.model / "fit.json"),
             *([codec] if codec else []),
-            *matte_is_found(result.matte),
+            *([fact("matte_is_found")] if result.matte == "found" else []),
             *warnings_of(result.training),
             *stands_still(result.changes.get("holdout", {}), scene.num_frames, limits),
         ]

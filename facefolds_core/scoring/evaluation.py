@@ -23,7 +23,7 @@ from facefolds_core.scoring.model_view import PosedView
 from facefolds_core.scoring.panels import ImageScore, Panel
 from facefolds_core.scoring.patches import WorstPatch, find_patch
 from facefolds_core.scoring.perceptual import Perceptual
-from facefolds_core.scoring.temporal import Change, Film, Sums, change_of
+from facefolds_core.scoring.temporal import Change, Film, change_of
 from facefolds_core.scoring.training_scores import TrainingView
 from facefolds_core.scoring.training_views import training_views
 from facefolds_core.scoring.truths import MatteKind, Truths
@@ -105,7 +105,8 @@ def evaluate(
                             roll.add(shot.panel.frame, shot.panel.truth, shot.panel.shown)
                         bar.update()
                 sums.append(film.sums())
-            changes[split] = _changes(sums)
+            filmed = [each for each in sums if each]
+            changes[split] = {name: change_of(each[name] for each in filmed) for name in (filmed[0] if filmed else ())}
     if show.worst is None:
         raise UserError(
             "no held-out camera has a photo: there is nothing to score on",
@@ -140,12 +141,6 @@ class _Show:
             self.patch = shot.patch
         if frame in self._on_sheet:
             self.panels.append(panel)
-
-
-def _changes(films: Sequence[dict[str, Sums]]) -> dict[str, Change]:
-    """By variant, over all cameras."""
-    variants = dict.fromkeys(variant for film in films for variant in film)
-    return {variant: change_of(film[variant] for film in films if variant in film) for variant in variants}
 
 
 class _Scorer:

@@ -37,22 +37,19 @@ _DECIMALS = 5
 T = TypeVar("T", bound=BaseModel)
 
 
-class Training(BaseModel):
-    """What is read of model/training.json."""
-
-    model_config = ConfigDict(frozen=True, allow_inf_nan=False)
-
-    seconds: Annotated[float, Field(ge=0)]
-    iterations: Annotated[int, Field(ge=0)]
-    device: str
-
-
 class Timing(BaseModel):
     """What is read of timings/<stage>.json."""
 
     model_config = ConfigDict(frozen=True, allow_inf_nan=False)
 
     seconds: Annotated[float, Field(ge=0)]
+
+
+class Training(Timing):
+    """What is read of model/training.json."""
+
+    iterations: Annotated[int, Field(ge=0)]
+    device: str
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,6 @@ from facefolds_core.files.reading import is_there
 from facefolds_core.files.writing import read_json
 from facefolds_core.params import ScoreWarningParams
 from facefolds_core.scoring.temporal import Change
-from facefolds_core.scoring.truths import MatteKind
 
 
 def stands_still(changes: Mapping[str, Change], frames: int, params: ScoreWarningParams) -> list[Fact]:
@@ -24,15 +23,10 @@ def stands_still(changes: Mapping[str, Change], frames: int, params: ScoreWarnin
     asset, model = changes.get("asset"), changes.get("model")
     if asset is None or model is None or asset.temporal is None or model.temporal is None:
         return []
-    if frames < params.min_frames or (asset.truth_change or 0.0) < params.min_change:
-        return []
-    if asset.temporal >= params.min_temporal:
+    moves = frames >= params.min_frames and (asset.truth_change or 0.0) >= params.min_change
+    if not moves or asset.temporal >= params.min_temporal:
         return []
     return [fact("stands_still", asset=asset.temporal, model=model.temporal, under=params.min_temporal)]
-
-
-def matte_is_found(kind: MatteKind) -> list[Fact]:
-    return [fact("matte_is_found")] if kind == "found" else []
 
 
 def training_events(fit: Path) -> list[Fact]:
