@@ -11,9 +11,6 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache, partial
 
-import numpy as np
-from numpy.typing import NDArray
-
 from facefolds_core.captures.capture import Capture, check_plate_size, wrong_size
 from facefolds_core.captures.images import corrected_colour, display_colour, downsample, to_8bit
 from facefolds_core.captures.lens import Lens, undistort
@@ -115,7 +112,5 @@ def _video_of(negative: Negative) -> Video | None:
     return negative.picture.video if isinstance(negative.picture, VideoFrame) else None
 
 
-@lru_cache(maxsize=8)
-def _maps(lens: Lens, width: int, height: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """`Lens.maps`, kept while the frames of a camera are read."""
-    return lens.maps(width, height)
+_maps = lru_cache(maxsize=8)(Lens.maps)
+"""Kept while the frames of a camera are read."""

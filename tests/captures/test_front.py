@@ -11,8 +11,7 @@ import pytest
 from numpy.typing import NDArray
 
 from facefolds_core.captures.actor import make_rig
-from facefolds_core.captures.front import find_front
-from facefolds_core.captures.normalization import nearest_to_axes, normalizing_similarity, orientation
+from facefolds_core.captures.normalization import find_front, nearest_to_axes, normalizing_similarity, orientation
 from facefolds_core.captures.sources import SOURCES
 from facefolds_core.errors import UserError
 from facefolds_core.geometry.cameras import Camera

@@ -10,10 +10,14 @@ at 0); any unit. Read from zju3dv/EasyMocap: easymocap/mytools/camera_utils.py (
 zju3dv/EasyVolcap: easyvolcap/utils/easy_utils.py (Rot_ where R_ is missing, ccm_). Masks of ZJU-MoCap (mask_cihp) are
 labels of parts, 0 to 19: what is not 0 is the subject, as zju3dv's readers take it. annots.npy of ZJU-MoCap is a
 pickle, which can run code, and is not read.
+
+The YAML is what OpenCV's `FileStorage` writes, 1.0 with matrices of its own tag, read as plain YAML: OpenCV's reader
+prints to the terminal, and says of a damaged file neither line nor key.
 """
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,19 +29,20 @@ from numpy.typing import NDArray
 
 from facefolds_core.captures.capture import Capture
 from facefolds_core.captures.gathering import Calibration, Recognised, footage, gather, inside, pictures_in
-from facefolds_core.captures.numbers import short
-from facefolds_core.captures.opencv_yaml import REMEDY, matrix_of, needed_matrix, read_storage
+from facefolds_core.captures.numbers import numbers_from, short
 from facefolds_core.captures.picture import FilePicture, Picture
 from facefolds_core.captures.videos import CONTAINERS
 from facefolds_core.errors import UserError
 from facefolds_core.facts import Fact, fact, shorten
-from facefolds_core.files.reading import is_regular
+from facefolds_core.files.parsing import parse_yaml
+from facefolds_core.files.reading import is_regular, read_text
 from facefolds_core.params import CaptureParams, Subject
 
 FPS = 30.0
 PIXEL_CENTRES = 0.0
 _LABELS = 32
 """A mask of no larger value than this has labels of parts of the body, not opacity."""
+REMEDY = "write the calibration again with the tool that made it"
 _MISSING = "point `path` at the folder that holds intri.yml and extri.yml"
 
 
@@ -138,3 +143,49 @@ def _masks(root: Path, names: list[str]) -> tuple[dict[str, dict[str, Picture]],
         return {}, []
     first, *others = found
     return found[first], [fact("masks_chosen", chosen=first, others=others)] if others else []
+
+
+def read_storage(path: Path, missing: str) -> dict[str, Any]:
+    """Key -> value of such a file; matrices are mappings {rows, cols, dt, data} still (`matrix_of`).
+
+    Args:
+        missing: the remedy where there is no such file.
+    """
+    text = read_text(path, missing, expected=path.name)
+    # "%YAML:1.0" is no directive of any YAML, and the tag tells no more than the mapping itself.
+    text = re.sub(r"\A\s*%YAML[^\n]*\n", "\n", text).replace("!!opencv-matrix", "")
+    value = parse_yaml(text, path, REMEDY)
+    if not isinstance(value, dict):
+        raise UserError("not OpenCV's YAML", file=path, expected="keys and matrices", found=short(value), remedy=REMEDY)
+    return value
+
+
+def matrix_of(
+    storage: dict[str, Any], key: str, shapes: tuple[tuple[int, int], ...], path: Path
+) -> NDArray[np.float64] | None:
+    """(rows, cols) of finite numbers, or None where the key is not there."""
+    value = storage.get(key)
+    if value is None:
+        return None
+
+    def refuse(expected: str, found: object) -> UserError:
+        return UserError("not a matrix", file=path, place=key, expected=expected, found=found, remedy=REMEDY)
+
+    if not isinstance(value, dict) or not isinstance(value.get("data"), list):
+        raise refuse("rows, cols, dt, data", short(value))
+    shape, data = (value.get("rows"), value.get("cols")), value["data"]
+    if shape not in shapes or len(data) != shape[0] * shape[1]:
+        found = f"{shape[0]} x {shape[1]} of {len(data)} numbers"
+        raise refuse(" or ".join(f"{rows} x {cols}" for rows, cols in shapes[:3]), found)
+    return numbers_from(data, path, key, REMEDY).reshape(shape)
+
+
+def needed_matrix(
+    storage: dict[str, Any], keys: dict[str, tuple[tuple[int, int], ...]], path: Path
+) -> NDArray[np.float64]:
+    """`matrix_of` the first key that is there; the shapes that each may have are given with it."""
+    found = [matrix_of(storage, key, shapes, path) for key, shapes in keys.items() if storage.get(key) is not None]
+    if not found or found[0] is None:
+        key = next(iter(keys))
+        raise UserError("a key is missing", file=path, place=key, expected="a matrix", found="nothing", remedy=REMEDY)
+    return found[0]
