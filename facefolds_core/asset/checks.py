@@ -14,7 +14,6 @@ import numpy as np
 
 from facefolds_core.asset.manifest import Coordinates, Level, Manifest
 from facefolds_core.asset.manifest_base import Row, Vector
-from facefolds_core.asset.manifest_extras import Photo
 from facefolds_core.asset.manifest_file import MANIFEST_NAME, seal_is_whole
 from facefolds_core.asset.packing import MAX_PIXELS, MAX_SIDE, AtlasLayout, inside
 from facefolds_core.asset.segments import segment_problems
@@ -52,7 +51,7 @@ def layout_of(level: Level) -> AtlasLayout:
 
 def manifest_problems(path: Path, manifest: Manifest) -> list[str]:
     """What is wrong inside a manifest that has all its keys, in words; the files that it names are not looked at."""
-    problems = []
+    problems, frames = [], manifest.full.texture.frames
     if not seal_is_whole(path.read_bytes()):
         problems.append("manifest_sha256 is not this file's: its content was changed")
     parts = [manifest.levels, manifest.photos, *(level.layers for level in manifest.levels)]
@@ -64,7 +63,8 @@ def manifest_problems(path: Path, manifest: Manifest) -> list[str]:
     problems += _coordinate_problems(manifest.coordinates)
     problems += [f"track: {problem}" for problem in track_problems(manifest)] + _extent_problems(manifest)
     for photo in manifest.photos:
-        problems += [f"{photo.file}: {problem}" for problem in _photo_problems(photo, manifest.full.texture.frames)]
+        late = [f"frame {photo.frame} of {frames}"] * (photo.frame >= frames)
+        problems += [f"{photo.file}: {problem}" for problem in late + _camera_problems(photo.K, photo.w2c)]
     problems += _poster_problems(manifest)
     pictures = [*manifest.photos, *([manifest.poster] if manifest.poster else [])]
     problems += [
@@ -178,11 +178,6 @@ def _poster_problems(manifest: Manifest) -> list[str]:
         return ["the poster's K, w2c and background come together"]
     problems = [f"poster: {problem}" for problem in _camera_problems(poster.K, poster.w2c)]
     return problems + ["the poster's background is no colour"] * (not all(0 <= c <= 1 for c in poster.background))
-
-
-def _photo_problems(photo: Photo, frames: int) -> list[str]:
-    problems = [f"frame {photo.frame} of {frames}"] * (photo.frame >= frames)
-    return problems + _camera_problems(photo.K, photo.w2c)
 
 
 def _camera_problems(K: tuple[Vector, Vector, Vector], w2c: tuple[Row, Row, Row]) -> list[str]:

@@ -57,8 +57,7 @@ def kind_of(file: BinaryIO, fragments: bool = False) -> Literal["mp4", "webm"]:
 
 def _check_boxes(file: BinaryIO, size: int, fragments: bool) -> None:
     """Walk the boxes of an MP4 of `size` bytes, those of the sample tables with their claims."""
-    start, stop = 0, size
-    waiting, boxes = [(start, stop, 0)], 0
+    waiting, boxes = [(0, size, 0)], 0
     while waiting:
         start, stop, depth = waiting.pop()
         for kind, inside, end in _boxes(file, start, stop):

@@ -51,9 +51,6 @@ class Transform(Part):
     def of(cls, similarity: Similarity) -> Transform:
         return cls.model_validate_json(json.dumps(similarity.to_json()))
 
-    def similarity(self) -> Similarity:
-        return Similarity.from_json(self.model_dump(mode="json"))
-
 
 class Coordinates(Part):
     """Axes and units of the meshes, and the way back to the capture."""

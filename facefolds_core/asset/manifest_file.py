@@ -19,7 +19,7 @@ from facefolds_core.asset.manifest import FORMAT_VERSION, LEAST_VERSION, REMEDY,
 from facefolds_core.asset.manifest_base import without_absent
 from facefolds_core.asset.stored import MISSING, special_problem
 from facefolds_core.errors import UserError
-from facefolds_core.files.writing import read_json, write_text
+from facefolds_core.files.writing import read_json, write_json, write_text
 
 MANIFEST_NAME = "manifest.json"
 SCHEMA_PATH = Path(__file__).with_name("manifest.schema.json")
@@ -175,4 +175,4 @@ def _missing_keys(whole: Any, given: Any, place: str = "") -> list[str]:
 
 def write_schema() -> None:
     """Write manifest.schema.json again, after a change of the models."""
-    write_text(SCHEMA_PATH, json.dumps(manifest_schema(), indent=1) + "\n")
+    write_json(SCHEMA_PATH, manifest_schema())

@@ -5,11 +5,10 @@ Then packets are copied into one file; nothing is encoded twice.
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from fractions import Fraction
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -20,9 +19,7 @@ import av
 from facefolds_core.asset.codecs import Codec
 from facefolds_core.asset.regions import Region
 from facefolds_core.asset.video import FORMATS, Picture, encode_video
-
-PICTURES_AHEAD = 2
-"""That are made on a thread of their own while one is encoded."""
+from facefolds_core.system.threads import in_order
 
 
 def encode_parts(
@@ -52,21 +49,10 @@ def encode_parts(
         single = len(borders) == 2
         files = [path if single else Path(folder) / f"{k}.{codec.container}" for k in range(len(borders) - 1)]
         for file, (first, after) in zip(files, pairwise(borders), strict=True):
-            encode_video(file, _ahead(picture, range(first, after)), size, rate, codec, options, regions)
+            made = in_order((partial(picture, k) for k in range(first, after)), threads=1)
+            encode_video(file, made, size, rate, codec, options, regions)
         if not single:
             _join(path, files, rate, codec)
-
-
-def _ahead(make: Callable[[int], Picture], frames: Iterable[int]) -> Iterator[Picture]:
-    """Pictures in their order; the next ones are made meanwhile."""
-    with ThreadPoolExecutor(1) as pool:
-        waiting = deque[Future[Picture]]()
-        for k in frames:
-            waiting.append(pool.submit(make, k))
-            if len(waiting) > PICTURES_AHEAD:
-                yield waiting.popleft().result()
-        while waiting:
-            yield waiting.popleft().result()
 
 
 def _join(path: Path, files: Sequence[Path], rate: Fraction, codec: Codec) -> None:

@@ -11,15 +11,16 @@ from typing import TypeVar
 T = TypeVar("T")
 
 
-def in_order(work: Iterable[Callable[[], T]]) -> Iterator[T]:
-    """What functions return, on a thread a core, in their order: two a core are begun before they are asked for."""
-    cores = os.cpu_count() or 1
-    with ThreadPoolExecutor(cores) as pool:
+def in_order(work: Iterable[Callable[[], T]], threads: int | None = None) -> Iterator[T]:
+    """What functions return, in their order: two a thread are begun before they are asked for. By default a thread a
+    core."""
+    threads = threads or os.cpu_count() or 1
+    with ThreadPoolExecutor(threads) as pool:
         waiting: deque[Future[T]] = deque()
         try:
             for function in work:
                 waiting.append(pool.submit(function))
-                if len(waiting) > 2 * cores:
+                if len(waiting) > 2 * threads:
                     yield waiting.popleft().result()
             while waiting:
                 yield waiting.popleft().result()

@@ -58,7 +58,8 @@ def test_makes_a_sound_asset(folders: SubjectFolders) -> None:
     crops = cap_crops(3, 2, 64)
     assert [layer.uv_window for layer in manifest.full.layers] == [crop.window for crop in crops]
     points = np.random.default_rng(0).normal(size=(5, 3))
-    back = manifest.coordinates.to_capture.similarity().apply(FROM_CAPTURE.apply(points))
+    to_capture = Similarity.from_json(manifest.coordinates.to_capture.model_dump(mode="json"))
+    back = to_capture.apply(FROM_CAPTURE.apply(points))
     np.testing.assert_allclose(back, points, atol=1e-12)
 
 

@@ -62,4 +62,4 @@ def test_few_pictures_are_made_ahead(tmp_path: Path, monkeypatch: pytest.MonkeyP
     codec = CODECS["h264"]
     encode_parts(tmp_path / "a.mp4", make, [0, 30], SIZE, RATE, codec, {})
     assert made == list(range(30))
-    assert max(ahead) == module.PICTURES_AHEAD
+    assert max(ahead) == 2

@@ -5,7 +5,6 @@ python -c "from facefolds_core.asset.gltf.extension import write_schema; write_s
 
 from __future__ import annotations
 
-import json
 from fractions import Fraction
 from pathlib import Path
 from typing import Annotated, Any
@@ -14,7 +13,7 @@ from pydantic import ConfigDict, Field
 from pydantic.alias_generators import to_camel
 
 from facefolds_core.asset.manifest_base import Count, Maybe, Part, RateTerm, Rect, Row, Scale, Sha256, without_absent
-from facefolds_core.files.writing import write_text
+from facefolds_core.files.writing import write_json
 
 NAME = "EXT_layered_volumetric_video"
 TEXTURE_VIDEO, DRACO = "KHR_texture_video", "KHR_draco_mesh_compression"
@@ -135,4 +134,4 @@ def _optional(part: dict[str, Any]) -> None:
 
 def write_schema(folder: Path) -> None:
     """Write the schema again, after a change of the models."""
-    write_text(folder / SCHEMA, json.dumps(schema(), indent=1) + "\n")
+    write_json(folder / SCHEMA, schema())
