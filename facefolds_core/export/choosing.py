@@ -98,12 +98,13 @@ class Seen:
 
 def _seen(
     scene: Scene,
-    looks: Sequence[Look],
     meshes: Sequence[TexturedMesh],
     windows: Sequence[Window],
     reflection: ReflectionMaps | None,
     textures: FrameStore,
-) -> list[Seen]:
+) -> tuple[Split, list[Seen]]:
+    """Of the cameras of the split by which things are chosen."""
+    split, looks = looks_of(scene)
     rng, layers = np.random.default_rng(0), sorted({layer for layer, _ in textures})
     images = {k: [textures.image(layer, k) for layer in layers] for k in {look.frame for look in looks}}
     found = []
@@ -117,7 +118,7 @@ def _seen(
             shine = composite(hits, own, added=added)[0] - composite(hits, own)[0]
             photo = photo - shine.reshape(-1, 3)[pixels]
         found.append(Seen(look, pixels, hits.at(pixels), own, photo))
-    return found
+    return split, found
 
 
 Picture = tuple[NDArray[np.float32], NDArray[np.float32]]
@@ -125,28 +126,22 @@ Picture = tuple[NDArray[np.float32], NDArray[np.float32]]
 
 
 def _least(
-    what: str,
-    candidates: Sequence[int],
-    pictures: Callable[[int], list[Picture]],
-    photos: Sequence[NDArray[np.float64]],
-    within: float,
-) -> tuple[int, dict[str, Any]]:
+    what: str, candidates: Sequence[int], pictures: Callable[[int], list[Picture]], split: Split, seen: Sequence[Seen]
+) -> tuple[int, Fact]:
     """From the finest down to the first that is not good enough: the one before it, and what was measured. The finest
     where no pixel counts.
 
     Args:
-        pictures: of a candidate, one a look.
-        photos: (M, 3) of each look, at the same pixels.
-        within: largest loss of PSNR to the best candidate, dB.
+        pictures: of a candidate, one of each of `seen`, at its pixels.
     """
     finest, *coarser = sorted(candidates, reverse=True)
-    best = pictures(finest)
-    seen = [alpha[0] > OPAQUE for _, alpha in best]
-    if not any(at.any() for at in seen):  # nothing says that less would do
+    best, photos = pictures(finest), [s.photo for s in seen]
+    counts = [alpha[0] > OPAQUE for _, alpha in best]
+    if not any(at.any() for at in counts):  # nothing says that less would do
         coarser = []
 
     def decibels(found: Sequence[Picture], truth: Sequence[NDArray[Any]]) -> float:
-        parts = [(one[0][0] - other)[at] for one, other, at in zip(found, truth, seen, strict=True)]
+        parts = [(one[0][0] - other)[at] for one, other, at in zip(found, truth, counts, strict=True)]
         error = float(np.mean(np.concatenate(parts, dtype=np.float64) ** 2)) if sum(map(len, parts)) else 0.0
         return -10 * float(np.log10(max(error, 1e-10)))
 
@@ -154,18 +149,21 @@ def _least(
     for c in coarser:
         found = pictures(c)
         psnr[c], fidelity[c] = decibels(found, photos), decibels(found, [rgb[0] for rgb, _ in best])
-        if max(psnr.values()) - psnr[c] > within or fidelity[c] < FIDELITY:
+        if max(psnr.values()) - psnr[c] > LOSS or fidelity[c] < FIDELITY:
             break
         chosen = c
-    return chosen, {
-        "what": what,
-        "chosen": chosen,
-        "below": round(max(psnr.values()) - psnr[chosen], 3),
-        "to_finest": round(fidelity[chosen], 2),
-        "tried": sorted(psnr),
-        "psnr": [round(psnr[c], 3) for c in sorted(psnr)],
-        "fidelity": [round(fidelity[c], 2) for c in sorted(psnr)],
-    }
+    return chosen, fact(
+        "resolution_chosen",
+        what=what,
+        chosen=chosen,
+        below=round(max(psnr.values()) - psnr[chosen], 3),
+        to_finest=round(fidelity[chosen], 2),
+        tried=sorted(psnr),
+        psnr=[round(psnr[c], 3) for c in sorted(psnr)],
+        fidelity=[round(fidelity[c], 2) for c in sorted(psnr)],
+        views=len(seen),
+        split=split,
+    )
 
 
 def _windows(grids: Grids) -> list[Window]:
@@ -186,9 +184,8 @@ def explained(
         meshes, windows: of all layers, outermost first.
         textures: layered store, N layers x K frames of (R, R, 4).
     """
-    _, looks = looks_of(scene)
     errors = []
-    for s in _seen(scene, looks, meshes, windows, reflection, textures):
+    for s in _seen(scene, meshes, windows, reflection, textures)[1]:
         rgb, alpha = composite(s.hits, s.images)
         errors.append(((rgb[0] - s.photo)[alpha[0] > OPAQUE]).astype(np.float64).ravel() ** 2)
     error = np.concatenate(errors)
@@ -207,14 +204,12 @@ def choose_meshes(
         ladder: of each candidate the meshes of all layers.
         grids, textures: as they were sampled.
     """
-    split, looks = looks_of(scene)
-    seen = _seen(scene, looks, ladder[max(MESHES)], _windows(grids), grids.reflection, textures)
+    split, seen = _seen(scene, ladder[max(MESHES)], _windows(grids), grids.reflection, textures)
 
     def pictures(candidate: int) -> list[Picture]:
         return [composite(cast_layers(s.look.camera, ladder[candidate]).at(s.pixels), s.images) for s in seen]
 
-    chosen, found = _least("decimate.resolution", MESHES, pictures, [s.photo for s in seen], LOSS)
-    return chosen, fact("resolution_chosen", **found, views=len(looks), split=split)
+    return _least("decimate.resolution", MESHES, pictures, split, seen)
 
 
 def choose_texels(scene: Scene, meshes: Sequence[TexturedMesh], grids: Grids, textures: FrameStore) -> tuple[int, Fact]:
@@ -226,13 +221,11 @@ def choose_texels(scene: Scene, meshes: Sequence[TexturedMesh], grids: Grids, te
     """
     tried = sorted({c for c in TEXELS if c < textures.height} | {textures.height})
     candidates = [c for c in tried if AtlasLayout.pack([(c, c)] * len(meshes)).fits()] or tried[:1]
-    split, looks = looks_of(scene)
-    seen = _seen(scene, looks, meshes, _windows(grids), grids.reflection, textures)
+    split, seen = _seen(scene, meshes, _windows(grids), grids.reflection, textures)
     images = {s.look.frame: s.images for s in seen}
 
     def pictures(candidate: int) -> list[Picture]:
         small = {k: [resample(image, candidate) for image in frame] for k, frame in images.items()}
         return [composite(s.hits, small[s.look.frame]) for s in seen]
 
-    chosen, found = _least("texture.resolution", candidates, pictures, [s.photo for s in seen], LOSS)
-    return chosen, fact("resolution_chosen", **found, views=len(looks), split=split)
+    return _least("texture.resolution", candidates, pictures, split, seen)

@@ -27,8 +27,6 @@ from facefolds_core.progress import progress
 AGGRESSIVENESS = (3, 5, 7)
 """Of the simplification, tried in turn until the target is reached."""
 
-Array = NDArray[np.float64]
-
 
 def decimate_layers(
     surfaces: Sequence[Surface], grids: Grids, resolution: int, params: DecimateParams
