@@ -27,7 +27,6 @@ ST_LPIPS = ("stlpips_pytorch", "weights/vST0.0/alex_shift_tolerant.pth")
 MIN_SIDE = 64
 """Pixels; smaller images are enlarged. The trunks see nothing useful below, and ST-LPIPS cannot run below 21."""
 
-_CHANNELS = (64, 192, 384, 256, 256)
 _SHIFT = (-0.030, -0.088, -0.188)
 _SCALE = (0.458, 0.448, 0.450)
 
@@ -187,7 +186,7 @@ def load_st_lpips() -> PerceptualDistance | None:
 
 
 def _linear(state: dict[str, Tensor]) -> list[Tensor]:
-    return [state[f"lin{i}.model.1.weight"] for i in range(len(_CHANNELS))]
+    return [state[f"lin{i}.model.1.weight"] for i in range(5)]
 
 
 def _hub_folder() -> Path:

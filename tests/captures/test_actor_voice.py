@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from facefolds_core.captures.actor.capture import PROGRAM, speak
 from facefolds_core.captures.actor.speech import PHRASES
-from facefolds_core.captures.actor.voice import PROGRAM, speak
 
 RATE = 8000
 SPEAKER = f"""#!{sys.executable}
