@@ -37,11 +37,7 @@ def change_manifest(folder: Path, change: Callable[[dict[str, Any]], None]) -> M
     value = parse_manifest(path).model_dump(mode="json")
     change(value)
     for level in value["levels"]:
-        entries = [
-            *level["meshes"],
-            *level["texture"]["videos"],
-            *filter(None, [level.get("reflection")]),
-        ]
+        entries = [*level["meshes"], *level["texture"]["videos"], *filter(None, [level.get("reflection")])]
         level["bytes"] = sum(entry["bytes"] for entry in entries)
     return write_manifest(Manifest.model_validate_json(json.dumps(value)), path)
 

@@ -38,14 +38,23 @@ def reader(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFact
     return folder
 
 
-def exported(folder: Path, moving: bool = False) -> tuple[Asset, Path]:
+@pytest.fixture(scope="module")
+def face(tmp_path_factory: pytest.TempPathFactory) -> tuple[Asset, Path]:
     """An asset, and its GLB."""
-    if moving:
-        asset = moving_asset(folder / "asset", layers=4, resolution=96)
-    else:
-        asset = make_asset(folder / "asset", layers=4, frames=3, resolution=96)
-    write_layered(folder / "face.glb", asset.full, "caps")
-    return asset, folder / "face.glb"
+    asset = make_asset(tmp_path_factory.mktemp("face") / "asset", layers=4, frames=3, resolution=96)
+    return asset, exported(asset)
+
+
+@pytest.fixture(scope="module")
+def moving(tmp_path_factory: pytest.TempPathFactory) -> tuple[Asset, Path]:
+    """Of a head that moves in the light of its room."""
+    asset = moving_asset(tmp_path_factory.mktemp("moving") / "asset", layers=4, resolution=96)
+    return asset, exported(asset)
+
+
+def exported(asset: Asset) -> Path:
+    write_layered(asset.folder.with_suffix(".glb"), asset.full, "caps")
+    return asset.folder.with_suffix(".glb")
 
 
 def shown(browser: Browser, reader: Path, glb: Path, cameras: Sequence[Camera]) -> dict[str, NDArray[np.float64]]:
@@ -55,16 +64,16 @@ def shown(browser: Browser, reader: Path, glb: Path, cameras: Sequence[Camera]) 
     return {name: picture.reshape(SIZE, 2, SIZE, 2, 3).mean((1, 3)) for name, picture in found.items()}
 
 
-def test_five_views_agree_with_the_reference(browser: Browser, reader: Path, tmp_path: Path) -> None:
-    asset, glb = exported(tmp_path)
+def test_five_views_agree_with_the_reference(browser: Browser, reader: Path, face: tuple[Asset, Path]) -> None:
+    asset, glb = face
     cameras = five_cameras(SIZE)
     found, expected = shown(browser, reader, glb, cameras), expected_means(asset, cameras, [FRAME])
     scores = {name: psnr(picture, expected[name, FRAME]) for name, picture in found.items()}
     assert len(scores) == 5 and min(scores.values()) >= AGREE, scores
 
 
-def test_a_head_that_moves_in_the_light_of_its_room(browser: Browser, reader: Path, tmp_path: Path) -> None:
-    asset, glb = exported(tmp_path, moving=True)
+def test_a_head_that_moves_in_the_light_of_its_room(browser: Browser, reader: Path, moving: tuple[Asset, Path]) -> None:
+    asset, glb = moving
     cameras = five_cameras(SIZE)[:2]
     for name, picture in shown(browser, reader, glb, cameras).items():
         camera = next(camera for camera in cameras if camera.name == name)
@@ -72,9 +81,8 @@ def test_a_head_that_moves_in_the_light_of_its_room(browser: Browser, reader: Pa
         assert psnr(picture, expected) >= AGREE, name
 
 
-def test_the_video_plays(browser: Browser, reader: Path, tmp_path: Path) -> None:
-    _, glb = exported(tmp_path)
-    with page_with(browser, reader, glb) as page:
+def test_the_video_plays(browser: Browser, reader: Path, face: tuple[Asset, Path]) -> None:
+    with page_with(browser, reader, face[1]) as page:
         assert sorted(page.evaluate("play('head.glb')")) == [0, 1, 2]
 
 
@@ -86,16 +94,16 @@ def test_its_sound_is_heard_with_it(browser: Browser, reader: Path, rich: Path, 
 
 @pytest.mark.parametrize(("sums", "words"), [(False, "no video can be decoded"), (True, "is damaged")])
 def test_a_damaged_video_leaves_the_still(
-    browser: Browser, reader: Path, tmp_path: Path, sums: bool, words: str
+    browser: Browser, reader: Path, face: tuple[Asset, Path], tmp_path: Path, sums: bool, words: str
 ) -> None:
-    _, glb = exported(tmp_path)
-    document, binary = opened(glb)
+    document, binary = opened(face[1])
     view = document["bufferViews"][document["extensions"]["KHR_texture_video"]["videos"][0]["bufferView"]]
     start = view["byteOffset"]
     if not sums:
         del document["nodes"][0]["extensions"][NAME]["checksums"]
-    glb.write_bytes(container(document, binary[:start] + bytes(view["byteLength"])))
-    with page_with(browser, reader, glb) as page:
+    damaged = container(document, binary[:start] + bytes(view["byteLength"]))
+    (tmp_path / "damaged.glb").write_bytes(damaged)
+    with page_with(browser, reader, tmp_path / "damaged.glb") as page:
         found = page.evaluate("fallback('head.glb')")
     assert found["videos"] == 0 and found["meshes"] == 2
     assert words in found["said"][0]

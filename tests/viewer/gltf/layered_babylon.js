@@ -9,6 +9,7 @@ import { DracoDecoder } from "@babylonjs/core/Meshes/Compression/dracoDecoder.js
 import "@babylonjs/loaders/glTF/2.0/index.js";
 import { projectionOf } from "../../../viewer/src/camera.js";
 import { registerLayeredVolumetricVideo } from "../../../viewer/gltf/babylon.js";
+import { framesOf, soundOf, warnings } from "./video.js";
 
 const at = (name) => new URL(`draco/${name}`, document.baseURI).href;
 DracoDecoder.DefaultConfiguration = {
@@ -18,21 +19,12 @@ DracoDecoder.DefaultConfiguration = {
 registerLayeredVolumetricVideo();
 
 async function opened(file, width = 64, height = 64) {
-  const canvas = Object.assign(document.createElement("canvas"), {
-    width,
-    height,
-  });
+  const canvas = Object.assign(document.createElement("canvas"), { width, height });
   const engine = new Engine(canvas, false, { preserveDrawingBuffer: true });
   const scene = new Scene(engine);
   scene.activeCamera = new FreeCamera("camera", Vector3.Zero(), scene);
   const { meshes } = await ImportMeshAsync(file, scene);
-  return {
-    canvas,
-    engine,
-    scene,
-    meshes,
-    videos: scene.metadata?.volumetricVideos ?? [],
-  };
+  return { canvas, engine, scene, meshes, videos: scene.metadata?.volumetricVideos ?? [] };
 }
 
 /** The asset's point in the scene: (x, y, z) -> glTF's (y, z, x) -> Babylon's, in which glTF's x is turned round. */
@@ -48,10 +40,7 @@ window.show = async (file, cameras, background, frame) => {
   const camera = scene.activeCamera;
   const pictures = cameras.map((given) => {
     const [, , forward] = given.w2c.map((row) => row.slice(0, 3));
-    const eye = [0, 1, 2].map(
-      (column) =>
-        -given.w2c.reduce((sum, row) => sum + row[column] * row[3], 0),
-    );
+    const eye = [0, 1, 2].map((column) => -given.w2c.reduce((sum, row) => sum + row[column] * row[3], 0));
     camera.position = placed(eye);
     camera.setTarget(placed(eye.map((value, i) => value + forward[i])));
     const projection = projectionOf(given, width, height, 0.01, 10);
@@ -64,47 +53,22 @@ window.show = async (file, cameras, background, frame) => {
   return pictures;
 };
 
-/** The frames that a video that plays shows until it has shown some. */
-window.play = async (file) => {
+/** What is done with a file's first video. */
+async function withVideo(file, act) {
   const { engine, videos } = await opened(file);
-  const [face] = videos;
-  const seen = new Set();
-  face.video.playbackRate = 0.0625; // a busy machine draws few pictures a second: each frame lasts for some
-  await face.video.play();
-  const end = performance.now() + 20000;
-  while (seen.size < 3 && performance.now() < end) {
-    seen.add(face.frame);
-    await new Promise((done) => requestAnimationFrame(done));
-  }
-  face.dispose();
+  const found = await act(videos[0]);
   engine.dispose();
-  return [...seen];
-};
-
-/** Bytes of sound that were decoded once it plays. */
-window.sound = async (file) => {
-  const { videos } = await opened(file);
-  const [face] = videos;
-  face.video.muted = false;
-  await face.video.play();
-  const end = performance.now() + 20000;
-  while (!face.video.webkitAudioDecodedByteCount && performance.now() < end)
-    await new Promise((done) => requestAnimationFrame(done));
-  const found = face.video.webkitAudioDecodedByteCount;
-  face.dispose();
   return found;
-};
+}
+
+window.play = (file) => withVideo(file, framesOf);
+window.sound = (file) => withVideo(file, soundOf);
 
 /** What is said of a GLB whose video cannot be decoded, and how many meshes show it. */
 window.fallback = async (file) => {
-  const said = [];
-  console.warn = (words) => said.push(words);
+  const said = warnings();
   const { engine, meshes, videos } = await opened(file);
-  const found = {
-    said,
-    meshes: meshes.filter((one) => one.geometry).length,
-    videos: videos.length,
-  };
+  const shown = meshes.filter((one) => one.geometry).length;
   engine.dispose();
-  return found;
+  return { said, meshes: shown, videos: videos.length };
 };
