@@ -11,6 +11,7 @@ from facefolds_core.subject.drawing import differentiate, draw, view_of
 from facefolds_core.subject.splats import COLUMNS
 from tests.scenes import look_at_origin
 from tests.subject.splats import some_splats
+from tests.threads import on_threads
 
 
 def test_picture_and_gradients_are_those_of_the_reference() -> None:
@@ -55,8 +56,8 @@ def test_threads_change_nothing() -> None:
     values, view = some_splats(300), view_of(look_at_origin("one", 20, 10, 64))
     results = []
     for threads in (1, numba.config.NUMBA_NUM_THREADS):
-        numba.set_num_threads(threads)
-        drawing = draw(values, view)
-        results.append((drawing.rgb, *differentiate(values, drawing, drawing.rgb, drawing.light)))
+        with on_threads(threads):
+            drawing = draw(values, view)
+            results.append((drawing.rgb, *differentiate(values, drawing, drawing.rgb, drawing.light)))
     for one, two in zip(*results, strict=True):
         np.testing.assert_array_equal(one, two)

@@ -86,33 +86,26 @@ def test_divergence_is_caught_and_the_last_checkpoint_kept(
     assert not (tmp_path / "model").exists()
 
 
-def test_checkpoint_of_another_configuration(scene: Scene, tmp_path: Path) -> None:
-    state, sampler = state_for(scene, params())
-    loop.train_step(state, sampler, params())
-    save_checkpoint(state, "aaaa", tmp_path)
-    with pytest.raises(UserError, match="another configuration") as caught:
-        load_checkpoint(state, "bbbb", tmp_path)
-    assert "bbbb" in str(caught.value.expected) and "aaaa" in str(caught.value.found)
-
-
-def test_checkpoint_of_another_architecture(scene: Scene, tmp_path: Path) -> None:
-    state, sampler = state_for(scene, params())
-    loop.train_step(state, sampler, params())
-    save_checkpoint(state, "aaaa", tmp_path)
-    other, _ = state_for(scene, params(texture_width=20))
-    with pytest.raises(UserError, match="does not belong") as caught:
-        load_checkpoint(other, "aaaa", tmp_path)
-    assert "shape" in str(caught.value.expected)
-
-
-def test_truncated_checkpoint(scene: Scene, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("asked", "values", "cut", "message", "fields"),
+    [
+        ("bbbb", {}, None, "another configuration", {"expected": "bbbb", "found": "aaaa"}),
+        ("aaaa", {"texture_width": 20}, None, "does not belong", {"expected": "shape"}),
+        ("aaaa", {}, -10, "damaged", {"file": CHECKPOINT, "remedy": "delete"}),
+    ],
+    ids=["another configuration", "another architecture", "cut off"],
+)
+def test_a_checkpoint_that_cannot_be_taken_up_is_refused(
+    scene: Scene, tmp_path: Path, asked: str, values: dict, cut: int | None, message: str, fields: dict[str, str]
+) -> None:
     state, sampler = state_for(scene, params())
     loop.train_step(state, sampler, params())
     path = save_checkpoint(state, "aaaa", tmp_path)
-    path.write_bytes(path.read_bytes()[:-10])
-    with pytest.raises(UserError, match="damaged") as caught:
-        load_checkpoint(state, "aaaa", tmp_path)
-    assert caught.value.file == path and "delete" in str(caught.value.remedy)
+    path.write_bytes(path.read_bytes()[:cut])
+    with pytest.raises(UserError, match=message) as caught:
+        load_checkpoint(state_for(scene, params(**values))[0], asked, tmp_path)
+    for name, words in fields.items():
+        assert words in str(getattr(caught.value, name)), name
 
 
 def test_fingerprint_tells_configurations_and_scenes_apart(scene: Scene, tmp_path: Path) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 import pytest
 import torch
@@ -15,6 +14,7 @@ from facefolds_core.training.explicit import adam_kernel, reference, shading_ker
 from facefolds_core.training.explicit.rates import BETAS
 from facefolds_core.training.explicit.smoothing import smooth, smooth_reference
 from facefolds_core.training.explicit.state import MIN_ALPHA, MIN_LIGHT
+from tests.threads import on_threads
 
 WINDOW = (-0.5, 0.4, -0.3, 0.6)
 
@@ -109,12 +109,11 @@ def test_shading_at_extreme_alphas(alpha: float) -> None:
 def test_shading_does_not_depend_on_the_number_of_threads() -> None:
     results = []
     for threads in (1, 2, 4):
-        numba.set_num_threads(min(threads, numba.config.NUMBA_NUM_THREADS))
         p = _problem(2 * scatter.CHUNK + 1000, 6, (9, 9))
         gradient = np.zeros((6, 9, 9, 4), np.float32)
-        squares = shading_kernel.shade(*p.values(), gradient, 0.0, MIN_LIGHT, False)
+        with on_threads(threads):
+            squares = shading_kernel.shade(*p.values(), gradient, 0.0, MIN_LIGHT, False)
         results.append((gradient, squares))
-    numba.set_num_threads(numba.config.NUMBA_NUM_THREADS)
     for other in results[1:]:
         for a, b in zip(results[0], other, strict=True):
             np.testing.assert_array_equal(a, b)

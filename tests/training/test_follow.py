@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 import torch
 
@@ -15,6 +14,7 @@ from facefolds_core.training.explicit.rates import ALPHA_RATE, BETAS
 from facefolds_core.training.explicit.state import MIN_LIGHT, TextureState
 from facefolds_core.training.explicit.targets import ALL_COLOURS
 from facefolds_core.training.explicit.views import StillRays, Views
+from tests.threads import on_threads
 
 PARAMS = ExplicitParams()
 LAYERS, SHAPE, RAYS = 4, (9, 7), 600
@@ -170,12 +170,11 @@ def test_a_frame_alone_goes_towards_its_pictures() -> None:
 def test_following_does_not_depend_on_the_number_of_threads() -> None:
     found = []
     for threads in (1, 2):
-        numba.set_num_threads(min(threads, numba.config.NUMBA_NUM_THREADS))
         film = Film()
         state = film.state()
-        follow(state, film.source, film, RATES, unlit)
+        with on_threads(threads):
+            follow(state, film.source, film, RATES, unlit)
         found.append(state.frame_colour.clone())
-    numba.set_num_threads(numba.config.NUMBA_NUM_THREADS)
     assert torch.equal(*found)
 
 

@@ -7,7 +7,6 @@ from types import SimpleNamespace
 from typing import Any, cast
 from unittest.mock import patch
 
-import numba
 import numpy as np
 import pytest
 import torch
@@ -37,6 +36,7 @@ from facefolds_core.training.explicit.reflection_maps import (
     values_at,
 )
 from facefolds_core.training.explicit.views import Views
+from tests.threads import on_threads
 from tests.training.test_explicit_kernels import random_cut
 
 WINDOW = (-0.5, 0.4, -0.3, 0.6)
@@ -221,13 +221,9 @@ def test_light_that_stays_with_the_room_is_not_taken_for_the_heads() -> None:
 def test_the_fit_does_not_depend_on_threads() -> None:
     truth = _random_maps(3)
     seen, found = _seen(truth, 0.2), []
-    before = numba.get_num_threads()
-    try:
-        for threads in (1, min(2, numba.config.NUMBA_NUM_THREADS)):
-            numba.set_num_threads(threads)
+    for threads in (1, 2):
+        with on_threads(threads):
             found.append(fit_maps(seen, truth, 3, PARAMS))
-    finally:
-        numba.set_num_threads(before)
     names = [field.name for field in fields(Maps)]
     assert all(np.array_equal(getattr(found[0], name), getattr(found[1], name)) for name in names)
 
