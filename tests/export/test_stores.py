@@ -101,48 +101,32 @@ def test_pickled_objects_are_refused(tmp_path: Path) -> None:
         read_meshes(tmp_path / "meshes.npz")
 
 
-@pytest.mark.parametrize(
-    ("change", "place"),
-    [
-        ({"points": np.zeros((2, 8, 8, 2), np.float32)}, "points"),
-        ({"normals": np.full((2, 8, 8, 3), np.nan, np.float32)}, "normals"),
-        ({"valid": np.ones((2, 8, 8), np.uint8)}, "valid"),
-        ({"opacity": np.ones((2, 8, 8), bool)}, "opacity"),
-        ({"chart": Chart((0.0, np.nan, 0.0))}, "centre"),
-        ({"windows": np.tile([0.5, -0.5, -1.0, 1.0], (2, 1))}, "windows"),
-    ],
-)
-def test_wrong_grids_are_errors(tmp_path: Path, grids: Grids, change: dict[str, Any], place: str) -> None:
-    write_grids(tmp_path / "grids.npz", replace(grids, **change))
+WRONG: list[tuple[str, dict[str, Any], str]] = [
+    ("grids", {"points": np.zeros((2, 8, 8, 2), np.float32)}, "points"),
+    ("grids", {"normals": np.full((2, 8, 8, 3), np.nan, np.float32)}, "normals"),
+    ("grids", {"valid": np.ones((2, 8, 8), np.uint8)}, "valid"),
+    ("grids", {"opacity": np.ones((2, 8, 8), bool)}, "opacity"),
+    ("grids", {"chart": Chart((0.0, np.nan, 0.0))}, "centre"),
+    ("grids", {"windows": np.tile([0.5, -0.5, -1.0, 1.0], (2, 1))}, "windows"),
+    ("sheets", {"radii": np.ones((2, 8, 7), np.float32)}, "radii"),
+    ("sheets", {"radii": np.zeros((2, 8, 8), np.float32)}, "radii"),
+    ("sheets", {"radii": np.array([1, 2], np.float32)[:, None, None] * np.ones((8, 8), np.float32)}, "radii"),
+    ("sheets", {"st": np.full((8, 8, 2), np.inf)}, "st"),
+    ("sheets", {"falling": np.ones((8, 8), bool)}, "falling"),
+    ("meshes", {"faces": np.array([[0, 1, 3]], np.int32)}, "faces_00"),
+    ("meshes", {"st": np.array([[0, 0], [0.5, 1], [1.5, 0]], np.float32)}, "st_00"),
+    ("meshes", {"st": np.zeros((2, 2), np.float32)}, "st_00"),
+]
+
+
+@pytest.mark.parametrize(("kind", "change", "place"), WRONG)
+def test_wrong_arrays_are_named(tmp_path: Path, grids: Grids, kind: str, change: dict[str, Any], place: str) -> None:
+    path, read = tmp_path / "file.npz", {"grids": read_grids, "sheets": read_surfaces, "meshes": read_meshes}[kind]
+    if kind == "grids":
+        write_grids(path, replace(grids, **change))
+    elif kind == "sheets":
+        write_sheets(path, replace(grid_sheets(grids, None), **change))
+    else:
+        write_meshes(path, [replace(TRIANGLE, **change)])
     with pytest.raises(UserError, match=place):
-        read_grids(tmp_path / "grids.npz")
-
-
-@pytest.mark.parametrize(
-    ("change", "place"),
-    [
-        ({"radii": np.ones((2, 8, 7), np.float32)}, "radii"),
-        ({"radii": np.zeros((2, 8, 8), np.float32)}, "radii"),
-        ({"radii": np.array([1, 2], np.float32)[:, None, None] * np.ones((8, 8), np.float32)}, "radii"),
-        ({"st": np.full((8, 8, 2), np.inf)}, "st"),
-        ({"falling": np.ones((8, 8), bool)}, "falling"),
-    ],
-)
-def test_wrong_sheets_are_errors(tmp_path: Path, grids: Grids, change: dict[str, Any], place: str) -> None:
-    write_sheets(tmp_path / "surfaces.npz", replace(grid_sheets(grids, None), **change))
-    with pytest.raises(UserError, match=place):
-        read_surfaces(tmp_path / "surfaces.npz")
-
-
-@pytest.mark.parametrize(
-    ("change", "place"),
-    [
-        ({"faces": np.array([[0, 1, 3]], np.int32)}, "faces_00"),
-        ({"st": np.array([[0, 0], [0.5, 1], [1.5, 0]], np.float32)}, "st_00"),
-        ({"st": np.zeros((2, 2), np.float32)}, "st_00"),
-    ],
-)
-def test_wrong_meshes_are_errors(tmp_path: Path, change: dict[str, Any], place: str) -> None:
-    write_meshes(tmp_path / "meshes.npz", [replace(TRIANGLE, **change)])
-    with pytest.raises(UserError, match=place):
-        read_meshes(tmp_path / "meshes.npz")
+        read(path)
