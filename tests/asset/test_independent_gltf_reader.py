@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -41,8 +39,3 @@ def test_five_views_agree_with_the_reference(asset: Asset) -> None:
         found = face.render((-R.T @ t)[[1, 2, 0]], rays[:, [1, 2, 0]], FRAME, GREY_VALUE, picture)
         expected, _ = render(asset, camera, FRAME, (GREY_VALUE,) * 3)
         assert psnr(found.reshape(SIZE, 2, SIZE, 2, 3).mean((1, 3)), expected) >= AGREE, camera.name
-
-
-def test_the_reader_imports_nothing_of_ours() -> None:
-    text = (Path(__file__).parent / "independent_gltf_reader.py").read_text()
-    assert "import facefolds" not in text and "from facefolds" not in text

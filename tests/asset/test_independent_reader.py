@@ -53,6 +53,7 @@ def test_its_score_is_evaluates(tmp_path: Path, codec: str) -> None:
         assert abs(score(picture, k, reflection=False) - expected) > 0.5, k  # it is strong enough to be seen here
 
 
-def test_the_player_imports_nothing_of_ours() -> None:
-    text = (Path(__file__).parent / "independent_reader.py").read_text()
+@pytest.mark.parametrize("name", ["independent_reader.py", "independent_gltf_reader.py"])
+def test_readers_import_nothing_of_ours(name: str) -> None:
+    text = (Path(__file__).parent / name).read_text()
     assert "import facefolds" not in text and "from facefolds" not in text
