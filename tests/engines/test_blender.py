@@ -25,10 +25,14 @@ AGREE = 40.0
 """dB. Seen: 48 and more."""
 
 
-@pytest.mark.parametrize("kind", ["glb", "usd"])
-def test_five_cameras_agree_with_the_reference(tmp_path: Path, kind: str) -> None:
+@pytest.fixture(autouse=True)
+def _blender() -> None:
     if find_blender() is None:
         pytest.skip(f"no Blender: {REMEDY}")
+
+
+@pytest.mark.parametrize("kind", ["glb", "usd"])
+def test_five_cameras_agree_with_the_reference(tmp_path: Path, kind: str) -> None:
     asset, cameras = make_asset(tmp_path / "asset", layers=4, frames=3, resolution=96), five_cameras(SIZE)
     frame = FRAME if kind == "glb" else 0  # Blender's importer of USD knows no textures sampled in time
     if kind == "glb":
@@ -43,8 +47,6 @@ def test_five_cameras_agree_with_the_reference(tmp_path: Path, kind: str) -> Non
 
 def test_the_reflection_of_a_head_that_turned_agrees_with_the_reference(tmp_path: Path) -> None:
     """The light stays with the room."""
-    if find_blender() is None:
-        pytest.skip(f"no Blender: {REMEDY}")
     make_asset(tmp_path / "asset", layers=3, frames=2, resolution=96)
     add_reflection(tmp_path / "asset")
     level, cameras = with_track(read_asset(tmp_path / "asset").full, 30), five_cameras(SIZE)[:2]
@@ -56,8 +58,6 @@ def test_the_reflection_of_a_head_that_turned_agrees_with_the_reference(tmp_path
 
 def test_the_add_on_plays_the_extensions_video(tmp_path: Path) -> None:
     """The importer with the add-on: layers in the place of the still, a frame of the movie, the head's motion."""
-    if find_blender() is None:
-        pytest.skip(f"no Blender: {REMEDY}")
     level = with_track(make_asset(tmp_path / "asset", layers=4, frames=3, resolution=96).full)
     write_layered(tmp_path / "face.glb", level, "caps")
     cameras = five_cameras(SIZE)
