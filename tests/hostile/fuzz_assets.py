@@ -36,24 +36,8 @@ CODES = 2
 UNSEALED = "0" * 64
 NONSENSE: tuple[Any, ...] = (
     *(None, True, False, "", "1", "nan", "../x", "/etc/passwd", "a\\b", "\x1b[31m", "x" * 5000, "http://127.0.0.1:1/x"),
-    *(
-        float("nan"),
-        float("inf"),
-        -1,
-        0,
-        -0.0,
-        1e-300,
-        1e300,
-        10**9,
-        10**18,
-        10**40,
-        2**63,
-        0.5,
-        [],
-        {},
-        [[]],
-        {"a": 1},
-    ),
+    *(float("nan"), float("inf"), -1, 0, -0.0, 1e-300, 1e300, 10**9, 10**18, 10**40, 2**63, 0.5),
+    *([], {}, [[]], {"a": 1}),
 )
 Damage = tuple[str, bool]
 """(what was done, whether it must be refused)."""
