@@ -10,6 +10,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -88,6 +89,12 @@ def look_at_origin(name: str, azimuth: float, elevation: float, size: int, dista
     focal = size / 0.7
     K = np.array([[focal, 0, size / 2], [0, focal, size / 2], [0, 0, 1]])
     return Camera(name, K, np.concatenate([rotation, -(rotation @ centre)[:, None]], 1), size, size)
+
+
+def view_of(camera: Camera) -> dict[str, Any]:
+    """A camera as JSON has it."""
+    size = {"width": camera.width, "height": camera.height}
+    return {"K": camera.K.tolist(), "w2c": camera.w2c.tolist(), **size}
 
 
 def _sphere_mesh(radius: float, resolution: int = 24) -> tuple[Array, NDArray[np.int32]]:

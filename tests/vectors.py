@@ -39,6 +39,7 @@ from facefolds_core.params import CompressParams, LevelParams, MeshCodec, Stream
 from facefolds_core.rendering.pixels import render
 from facefolds_core.rendering.reference import render_asset
 from tests.assets import grid_faces
+from tests.scenes import view_of
 
 ASSETS = ("short", "stream")
 EXAMPLE = "short.glb"
@@ -181,9 +182,9 @@ def _views(asset: str, level: str) -> Iterator[dict[str, Any]]:
         if (asset, level) != ("short", FULL) and camera.name not in ("left", "odd", "coarse"):
             continue
         for frame in (0,) if index % 2 else (0, 2, FRAMES - 1):
-            pose = {"K": camera.K.tolist(), "w2c": camera.w2c.tolist(), "width": camera.width, "height": camera.height}
             file = f"{asset}_{level}_{camera.name}_{frame}.png"
-            yield {"file": file, "asset": asset, "level": level, "frame": frame, "camera": camera.name, **pose}
+            said = {"file": file, "asset": asset, "level": level, "frame": frame, "camera": camera.name}
+            yield {**said, **view_of(camera)}
 
 
 def _picture(asset: Asset, view: dict[str, Any], filtered: str) -> NDArray[np.uint8]:

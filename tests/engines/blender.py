@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from facefolds_core.geometry.cameras import Camera
+from tests.scenes import view_of
 
 ROOT = Path(__file__).parents[2]
 SCRIPT = ROOT / "engines" / "blender" / "render.py"
@@ -46,10 +47,7 @@ def pictures(
     assert start is not None
     with tempfile.TemporaryDirectory() as place:
         files = {camera.name: Path(place) / f"{camera.name}.png" for camera in cameras}
-        views = [
-            {"file": str(files[c.name]), "width": c.width, "height": c.height, "K": c.K.tolist(), "w2c": c.w2c.tolist()}
-            for c in cameras
-        ]
+        views = [{"file": str(files[camera.name]), **view_of(camera)} for camera in cameras]
         (Path(place) / "views.json").write_text(json.dumps(views))
         words = ["--views", f"{place}/views.json", "--samples", "1", "--frame", str(frame)]
         words += ["--background", *[str(background)] * 3]

@@ -29,17 +29,14 @@ from facefolds_core.rendering.pixels import render
 from facefolds_core.rendering.reflection import reflected_colours
 from tests.assets import SOURCE, make_asset
 from tests.engines.tracks import with_track
-from tests.scenes import look_at_origin
+from tests.pictures import psnr
+from tests.scenes import look_at_origin, view_of
 from tests.viewer.fixtures import add_reflection, change_manifest, random_reflection
 
 
 @pytest.fixture(scope="module")
 def caps(tmp_path_factory: pytest.TempPathFactory) -> Asset:
     return make_asset(tmp_path_factory.mktemp("opengl") / "asset", layers=5, frames=3, resolution=64)
-
-
-def psnr(found: np.ndarray, expected: np.ndarray) -> float:
-    return float(-10 * np.log10(np.mean((found.astype(np.float64) - expected) ** 2)))
 
 
 def test_it_agrees_with_the_reference(caps: Asset) -> None:
@@ -222,8 +219,7 @@ def test_by_default_a_still_shows_means_over_pixels(caps: Asset, tmp_path: Path)
     shutil.copytree(caps.folder, folder)
     add_reflection(folder)
     camera = look_at_origin("camera", 35, 10, 64)
-    pose = {"K": camera.K.tolist(), "w2c": camera.w2c.tolist(), "width": 64, "height": 64}
-    (tmp_path / "camera.json").write_text(json.dumps(pose))
+    (tmp_path / "camera.json").write_text(json.dumps(view_of(camera)))
     look = ["--camera", tmp_path / "camera.json", "--frame", "1", "--background", "#336699"]
     done = run(folder, "--out", tmp_path / "still.png", *look)
     assert done.exit_code == 0, done.output
@@ -254,9 +250,7 @@ def test_where_no_camera_stood_is_said(tmp_path: Path) -> None:
     change_manifest(tmp_path / "asset", lambda value: value.update(view=FILMED.model_dump(exclude_none=True)))
     small = ["--size", "64x48", "--samples", "1"]
     still, film = ["--out", tmp_path / "a.png"], ["--out", tmp_path / "a.mp4", "--seconds", "0.4"]
-    camera = look_at_origin("behind", 180, 0, 64)
-    there = {"K": camera.K.tolist(), "w2c": camera.w2c.tolist(), "width": 64, "height": 64}
-    (tmp_path / "behind.json").write_text(json.dumps(there))
+    (tmp_path / "behind.json").write_text(json.dumps(view_of(look_at_origin("behind", 180, 0, 64))))
     for arguments, said in (
         ([*still, "--azimuth", "180"], "this looks from where no camera stood, 150 degrees beyond"),
         ([*still, "--azimuth", "340"], ""),
