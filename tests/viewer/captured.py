@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from playwright.sync_api import Page
 
 from facefolds_core.geometry.cameras import Camera
+from tests.scenes import view_of
 
 CODE = """(camera) => {
     const { data, height, width } = document.querySelector('facefolds-player').capture(camera ?? undefined);
@@ -20,11 +21,5 @@ CODE = """(camera) => {
 
 def captured(page: Page, camera: Camera | None = None) -> NDArray[np.float64]:
     """(H, W, 4) in [0, 1]: from a camera, or as it stands on the page."""
-    given = camera and {
-        "K": camera.K.tolist(),
-        "w2c": camera.w2c.tolist(),
-        "width": camera.width,
-        "height": camera.height,
-    }
-    height, width, data = json.loads(page.evaluate(CODE, given))
+    height, width, data = json.loads(page.evaluate(CODE, camera and view_of(camera)))
     return np.frombuffer(base64.b64decode(data), np.uint8).reshape(height, width, 4) / 255

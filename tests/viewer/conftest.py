@@ -22,6 +22,7 @@ from tests.viewer.captured import captured
 PATIENCE = 60_000
 """Milliseconds for what takes one: software rendering on a busy machine."""
 ELEMENT = "document.querySelector('facefolds-player')"
+NO_WEBCODECS = "delete globalThis.VideoDecoder"
 
 
 @pytest.fixture(scope="session")
@@ -108,6 +109,10 @@ class Player:
         return captured(self.page, camera)
 
 
+NewPlayer = Callable[..., Player]
+Show = Callable[..., Player]
+
+
 def touching(player: Player) -> Callable[..., object]:
     """What touches the screen: takes a kind, "touchStart", "touchMove" or "touchEnd", and the fingers' (x, y)."""
     client = player.page.context.new_cdp_session(player.page)
@@ -128,6 +133,15 @@ def page_of_yours(player: Player, body: str) -> None:
     player.page.goto(f"{player.address}yours.html")
 
 
+def element(new_player: NewPlayer, asset: Path, attributes: str = "", inner: str = "", **options: object) -> Player:
+    """A page of yours with an element that shows the asset at its full level."""
+    player = new_player({"asset": asset}, viewport={"width": 400, "height": 300}, **options)
+    style = "height: 300px"
+    page_of_yours(player, f'<facefolds-player src="asset/" style="{style}" {attributes}>{inner}</facefolds-player>')
+    player.wait("e.level === 'full'")
+    return player
+
+
 def listening(page: Page) -> tuple[list[str], list[str]]:
     """What a page says on its console or as an error, and the addresses that it asks for, from now on."""
     said: list[str] = []
@@ -136,10 +150,6 @@ def listening(page: Page) -> tuple[list[str], list[str]]:
     page.on("pageerror", lambda error: said.append(str(error)))
     page.on("request", lambda request: fetched.append(request.url))
     return said, fetched
-
-
-NewPlayer = Callable[..., Player]
-Show = Callable[..., Player]
 
 
 @pytest.fixture

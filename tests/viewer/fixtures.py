@@ -21,7 +21,7 @@ from facefolds_core.asset.reflection import pack_reflection
 from facefolds_core.geometry.reflections import ReflectionMaps
 from facefolds_core.params import CompressParams, VideoCodec
 from tests.assets import MOVING, make_asset
-from tests.scenes import look_at_origin
+from tests.scenes import look_at_origin, view_of
 
 THREE_CODECS = CompressParams(video=VideoCodec(codec=("h264", "vp9", "av1"), crf=8, preset="slow", keyframe_interval=4))
 
@@ -112,5 +112,4 @@ def photo_entry(folder: Path, index: int, frame: int) -> dict[str, Any]:
     camera = look_at_origin(f"photo{index}", 30 * index, 5, 64)
     image = np.full((64, 64, 3), (40, 80 + 60 * index, 200), np.uint8)
     entry = write_png(folder / f"photo{index}.png", image)
-    pose = {"K": camera.K.tolist(), "w2c": camera.w2c.tolist()}
-    return entry | {"camera": camera.name, "frame": frame, "width": 64, "height": 64} | pose
+    return entry | {"camera": camera.name, "frame": frame} | view_of(camera)

@@ -20,6 +20,7 @@ from playwright.sync_api import Browser, Page
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.serving.server import serving
 from tests.pictures import GREY
+from tests.scenes import view_of
 
 VIEWER = Path(__file__).parents[2] / "viewer"
 GltfViewer = Literal["three", "model_viewer", "layered_three", "layered_babylon"]
@@ -56,9 +57,8 @@ def pictures(
         folder: what `build` filled.
         frame: for pages that play.
     """
-    given = [{"K": c.K.tolist(), "w2c": c.w2c.tolist(), "width": c.width, "height": c.height} for c in cameras]
     with page_with(browser, folder, glb) as page:
         code = "([cameras, background, frame]) => show('head.glb', cameras, background, frame)"
-        found = page.evaluate(code, [given, GREY, frame])
+        found = page.evaluate(code, [[view_of(camera) for camera in cameras], GREY, frame])
     shown = [Image.open(io.BytesIO(base64.b64decode(data))).convert("RGB") for data in found]
     return {camera.name: np.asarray(picture) / 255 for camera, picture in zip(cameras, shown, strict=True)}

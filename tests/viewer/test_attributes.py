@@ -11,14 +11,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from tests.viewer.conftest import NewPlayer, Player, page_of_yours
-
-
-def opened(new_player: NewPlayer, asset: Path, attributes: str = "", **options: object) -> Player:
-    player = new_player({"asset": asset}, viewport={"width": 400, "height": 300}, **options)
-    page_of_yours(player, f'<facefolds-player src="asset/" style="height: 300px" {attributes}></facefolds-player>')
-    player.wait("e.level === 'full'")
-    return player
+from tests.viewer.conftest import NO_WEBCODECS, NewPlayer, Player, element, page_of_yours
 
 
 def numbers(player: Player, expression: str) -> list[float]:
@@ -29,9 +22,9 @@ VIEW = "[e.state.view.azimuth, e.state.view.elevation, e.state.view.distance]"
 
 
 def test_camera_orbit_is_the_first_view(new_player: NewPlayer, rich: Path) -> None:
-    plain = opened(new_player, rich)
+    plain = element(new_player, rich)
     away = numbers(plain, VIEW)[2]
-    player = opened(new_player, rich, 'camera-orbit="30deg 80deg 120%"')
+    player = element(new_player, rich, 'camera-orbit="30deg 80deg 120%"')
     assert numbers(player, VIEW) == pytest.approx([30, 10, 1.2 * away])
     player.run("e.state = {view: {azimuth: -20}}; e.resetView()")
     assert numbers(player, VIEW)[0] == pytest.approx(30)
@@ -43,7 +36,7 @@ def test_camera_orbit_is_the_first_view(new_player: NewPlayer, rich: Path) -> No
 
 def test_camera_target_is_what_the_first_view_looks_at(new_player: NewPlayer, rich: Path) -> None:
     """glTF's axes: to the subject's left, up, before it."""
-    player = opened(new_player, rich, 'camera-target="0.1m auto -2cm"')
+    player = element(new_player, rich, 'camera-target="0.1m auto -2cm"')
     middle = numbers(player, "e.player.home.centre")
     assert numbers(player, "e.state.view.target") == pytest.approx([-0.02, 0.1, middle[2]])
     player.run("e.state = {view: {target: [0, 0, 0]}}; e.resetView()")
@@ -54,7 +47,7 @@ def test_camera_target_is_what_the_first_view_looks_at(new_player: NewPlayer, ri
 
 def test_a_page_bounds_the_view(new_player: NewPlayer, rich: Path) -> None:
     least, most = "-10deg 75deg 80%", "20deg 95deg 1.5m"
-    player = opened(new_player, rich, f'min-camera-orbit="{least}" max-camera-orbit="{most}"')
+    player = element(new_player, rich, f'min-camera-orbit="{least}" max-camera-orbit="{most}"')
     away = numbers(player, VIEW)[2]
     for asked, found in (((90, 60, 0.01), (20, 15, 0.8 * away)), ((-90, -60, 9), (-10, -5, 1.5))):
         view = dict(zip(("azimuth", "elevation", "distance"), asked, strict=True))
@@ -76,7 +69,7 @@ def drag(player: Player, dx: float, dy: float, button: Literal["left", "right"] 
 
 
 def test_panning_and_double_clicks_move_what_is_looked_at(new_player: NewPlayer, rich: Path) -> None:
-    player = opened(new_player, rich)
+    player = element(new_player, rich)
     goal, home = "e.player.view.goal.target", numbers(player, "e.player.view.home.target")
     drag(player, 30, 0, "right")
     assert numbers(player, goal) != home
@@ -110,7 +103,7 @@ def test_a_page_says_when_it_is_revealed(new_player: NewPlayer, rich: Path) -> N
 
 
 def test_a_narrower_field_of_view_shows_the_same_from_further_away(new_player: NewPlayer, rich: Path) -> None:
-    player = opened(new_player, rich, 'background="#00ff00" controls="none"')
+    player = element(new_player, rich, 'background="#00ff00" controls="none"')
     before, away = player.capture(), numbers(player, VIEW)[2]
     player.run("e.setAttribute('field-of-view', '12deg')")
     after = player.capture()
@@ -120,7 +113,7 @@ def test_a_narrower_field_of_view_shows_the_same_from_further_away(new_player: N
 
 
 def test_camera_controls_and_zoom_can_be_switched_off(new_player: NewPlayer, rich: Path) -> None:
-    player = opened(new_player, rich, "disable-zoom")
+    player = element(new_player, rich, "disable-zoom")
     before = numbers(player, VIEW)
     player.page.mouse.click(200, 100)
     player.page.mouse.wheel(0, -300)
@@ -141,7 +134,7 @@ def test_camera_controls_and_zoom_can_be_switched_off(new_player: NewPlayer, ric
 
 
 def test_it_turns_by_itself_and_again_after_a_touch(new_player: NewPlayer, rich: Path) -> None:
-    player = opened(new_player, rich, "auto-rotate")
+    player = element(new_player, rich, "auto-rotate")
     first = player.capture()
     player.page.wait_for_timeout(1500)
     assert np.abs(player.capture() - first).max() > 0.1
@@ -153,25 +146,25 @@ def test_it_turns_by_itself_and_again_after_a_touch(new_player: NewPlayer, rich:
 
 
 def test_with_reduced_motion_it_does_not_turn(new_player: NewPlayer, rich: Path) -> None:
-    player = opened(new_player, rich, "auto-rotate", reduced_motion="reduce")
+    player = element(new_player, rich, "auto-rotate", reduced_motion="reduce")
     player.page.wait_for_timeout(300)
     assert player.run("return e.player.view.swaying") == 0
 
 
 def test_a_prompt_for_who_does_nothing(new_player: NewPlayer, rich: Path) -> None:
-    player = opened(new_player, rich, 'interaction-prompt="auto"')
+    player = element(new_player, rich, 'interaction-prompt="auto"')
     assert player.notice() == "Drag to turn"
 
 
 def test_alt_names_the_picture(new_player: NewPlayer, rich: Path) -> None:
-    player = opened(new_player, rich, 'alt="Ann, who laughs"')
+    player = element(new_player, rich, 'alt="Ann, who laughs"')
     player.page.get_by_role("img", name="Ann, who laughs").wait_for()
     player.run("e.removeAttribute('alt')")
     player.page.get_by_role("img", name="Three-dimensional picture").wait_for()
 
 
 def test_time_and_sound(new_player: NewPlayer, rich: Path) -> None:
-    player = opened(new_player, rich, 'muted="false"')
+    player = element(new_player, rich, 'muted="false"')
     player.wait("e.player.sound")
     assert player.run("return [e.muted, e.player.sound.muted]") == [False, False]
     player.run("e.muted = true")
@@ -185,13 +178,13 @@ def test_time_and_sound(new_player: NewPlayer, rich: Path) -> None:
 
 @pytest.mark.parametrize(
     "script",
-    ["", pytest.param("delete globalThis.VideoDecoder", marks=pytest.mark.nightly)],
+    ["", pytest.param(NO_WEBCODECS, marks=pytest.mark.nightly)],
     ids=["WebCodecs", "video element"],
 )
 def test_events(new_player: NewPlayer, rich: Path, script: str) -> None:
     listen = """window.seen = {}; for (const name of ['load', 'progress', 'camera-change', 'ended', 'pause'])
         addEventListener(name, ({ type, detail }) => (seen[type] ??= []).push(detail?.totalProgress), true);"""
-    player = opened(new_player, rich, 'loop="false"', script=script + ";" + listen)
+    player = element(new_player, rich, 'loop="false"', script=script + ";" + listen)
     player.wait("seen.load")
     progress = numbers(player, "seen.progress")
     assert min(progress) < 0.9 and max(progress) == 1
@@ -203,14 +196,14 @@ def test_events(new_player: NewPlayer, rich: Path, script: str) -> None:
 
 
 def test_a_page_may_open_with_the_photo(new_player: NewPlayer, rich: Path) -> None:
-    player = opened(new_player, rich, 'photo="1" controls="none"')
+    player = element(new_player, rich, 'photo="1" controls="none"')
     player.wait("!e.shadowRoot.querySelector('.compare').hidden")
     assert player.run("return [e.state.photo, e.player.view.exact?.camera]") == [1, "photo1"]
     assert player.page.get_by_role("slider", name="Border between asset and photo").is_visible()
 
 
 def test_a_picture_of_what_is_seen(new_player: NewPlayer, rich: Path) -> None:
-    player = opened(new_player, rich)
+    player = element(new_player, rich)
     code = """const blob = await e.toBlob(v); const bytes = new Uint8Array(await blob.arrayBuffer());
         return [blob.type, btoa(String.fromCharCode(...bytes))];"""
     for options, kind in (({}, "image/png"), ({"mimeType": "image/jpeg", "qualityArgument": 0.9}, "image/jpeg")):
@@ -221,7 +214,7 @@ def test_a_picture_of_what_is_seen(new_player: NewPlayer, rich: Path) -> None:
 
 
 def test_parts_can_be_styled(new_player: NewPlayer, rich: Path) -> None:
-    player = opened(new_player, rich)
+    player = element(new_player, rich)
     player.run("const sheet = new CSSStyleSheet(); document.adoptedStyleSheets.push(sheet);"
                "sheet.replaceSync('facefolds-player::part(bar) { border-radius: 3px }')")  # fmt: skip
     style = "getComputedStyle(e.shadowRoot.querySelector('.bar')).borderRadius"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 import threading
 from collections.abc import Callable, Iterator
@@ -97,9 +96,12 @@ def test_an_asset_of_an_older_version_plays(new_player: NewPlayer, tmp_path: Pat
         ("{", "not JSON"),
         ("[]", "not a facefolds asset"),
         ('{"format": "facefolds", "version": 2}', "levels is not a list"),
+        ('{"format": "facefolds", "version": 5, "minVersion": 5}', "too old"),
     ],
 )
-def test_a_garbled_manifest(new_player: NewPlayer, asset: Path, text: str, said: str) -> None:
+def test_a_manifest_that_is_garbled_or_of_a_newer_format(
+    new_player: NewPlayer, asset: Path, text: str, said: str
+) -> None:
     (asset / "manifest.json").write_text(text)
     player = new_player({"asset": asset})
     player.open("asset", wait=False)
@@ -175,28 +177,22 @@ def test_try_again_loads_again(new_player: NewPlayer, one_level: Path, tmp_path:
     assert not player.page.get_by_role("alert").is_visible()
 
 
-@pytest.mark.parametrize(("damaged", "left"), [("full", "coarse"), ("coarse", "full")])
-def test_a_damaged_level_gives_way_to_the_other(new_player: NewPlayer, asset: Path, damaged: str, left: str) -> None:
+@pytest.mark.parametrize(
+    ("damaged", "left", "view"),
+    [
+        ("full", "coarse", "frame=0"),
+        ("coarse", "full", "frame=0"),
+        ("full", "coarse", "level=full&frame=0"),  # though it was asked for
+    ],
+)
+def test_a_damaged_level_gives_way_to_the_other(
+    new_player: NewPlayer, asset: Path, damaged: str, left: str, view: str
+) -> None:
     (asset / f"{damaged}_meshes.bin").unlink()
     player = new_player({"asset": asset}, allow=(NOT_FOUND,))
-    player.open("asset")
+    player.open("asset", view)
     assert f"{damaged}_meshes.bin is missing" in player.notice()
     assert player.run("e.play(); return [e.level, e.playing]") == [left, True]
-
-
-def test_a_damaged_level_that_was_named_gives_way_to_another(new_player: NewPlayer, asset: Path) -> None:
-    (asset / "full_meshes.bin").unlink()
-    player = new_player({"asset": asset}, allow=(NOT_FOUND,))
-    player.open("asset", "level=full&frame=0")
-    assert player.run("return e.level") == "coarse"
-
-
-def test_an_asset_of_a_newer_format(new_player: NewPlayer, asset: Path) -> None:
-    path = asset / "manifest.json"
-    path.write_text(json.dumps(json.loads(path.read_text()) | {"version": 5, "minVersion": 5}))
-    player = new_player({"asset": asset})
-    player.open("asset", wait=False)
-    assert "too old" in player.message()
 
 
 @contextmanager

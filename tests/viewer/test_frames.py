@@ -11,11 +11,11 @@ import pytest
 from facefolds_core.asset import read_asset
 from tests.assets import make_asset
 from tests.pictures import GREY, five_cameras, means_of_frames, psnr
-from tests.viewer.conftest import NewPlayer, Player
+from tests.viewer.conftest import NO_WEBCODECS, NewPlayer, Player
 from tests.viewer.fixtures import change_manifest
 
 CAMERA = five_cameras(64)[0]
-NO_WEBCODECS = "delete globalThis.VideoDecoder"
+DECODERS = pytest.mark.parametrize("script", ["", NO_WEBCODECS], ids=["WebCodecs", "video element"])
 
 
 @pytest.fixture(scope="module")
@@ -39,7 +39,7 @@ def nearest(player: Player, pictures: list[np.ndarray]) -> int:
     return best
 
 
-@pytest.mark.parametrize("script", ["", NO_WEBCODECS], ids=["WebCodecs", "video element"])
+@DECODERS
 def test_every_seek_shows_the_frame_asked_for(
     new_player: NewPlayer, rich: Path, pictures: list[np.ndarray], script: str
 ) -> None:
@@ -76,7 +76,7 @@ def test_of_many_seeks_the_last_wins(new_player: NewPlayer, rich: Path, pictures
     assert nearest(player, pictures) == 3
 
 
-@pytest.mark.parametrize("script", ["", NO_WEBCODECS], ids=["WebCodecs", "video element"])
+@DECODERS
 def test_playing_goes_round_without_a_gap(new_player: NewPlayer, rich: Path, script: str) -> None:
     """Frames come in order and wrap round; slowly enough that software rendering need not leave any out."""
     player = opened(new_player({"asset": rich}, script=script))

@@ -190,6 +190,8 @@ def test_it_sways_until_somebody_touches_it(show: Show) -> None:
 
 @pytest.mark.parametrize(("view", "options"), [("view=10,0,1,0,0,0", {}), ("", {"reduced_motion": "reduce"})])
 def test_a_chosen_view_and_reduced_motion_do_not_sway(show: Show, view: str, options: dict) -> None:
+    """With reduced motion it does not play by itself either."""
     player = show(view, **options)
     player.page.wait_for_timeout(200)
     assert player.run("return e.player.view.swaying") == 0
+    assert not options or player.run("return e.playing") is False

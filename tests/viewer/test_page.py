@@ -55,11 +55,6 @@ def test_all_requests_stay_on_the_server(show: Show) -> None:
     assert hosts == {urlsplit(player.address).netloc}
 
 
-def test_reduced_motion_does_not_start_by_itself(show: Show) -> None:
-    player = show("", reduced_motion="reduce")
-    assert player.run("return e.playing") is False
-
-
 def test_the_address_follows_the_view(show: Show) -> None:
     player = show()
     player.run("e.spread = 0.25; await e.step(2)")

@@ -18,7 +18,7 @@ from facefolds_core.rendering.pixels import lit_hits, render
 from facefolds_core.rendering.raster import cast_layers
 from tests.assets import MOVING, make_asset
 from tests.pictures import GREY, GREY_VALUE, expected_means, expected_pictures, five_cameras, psnr
-from tests.viewer.conftest import NewPlayer
+from tests.viewer.conftest import NO_WEBCODECS, NewPlayer
 from tests.viewer.fixtures import add_reflection, moving_asset
 
 SIZE = 160
@@ -53,7 +53,7 @@ def test_five_cameras_and_three_frames_agree_with_the_reference(new_player: NewP
 
 def test_the_video_element_shows_the_same(new_player: NewPlayer, caps: Asset) -> None:
     """Without WebCodecs: older browsers, and pages without HTTPS."""
-    check(new_player, caps, script="delete globalThis.VideoDecoder")
+    check(new_player, caps, script=NO_WEBCODECS)
 
 
 def test_where_pictures_come_late_what_moves_has_one_ray_a_pixel(new_player: NewPlayer, caps: Asset) -> None:

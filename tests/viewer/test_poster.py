@@ -16,6 +16,7 @@ from facefolds_core.asset.manifest_file import parse_manifest
 from facefolds_core.packaging.poster import BACKGROUND, FIELD_OF_VIEW, FILLED, write_poster
 from tests.assets import make_asset
 from tests.pictures import psnr
+from tests.scenes import view_of
 from tests.viewer.conftest import NewPlayer, Player
 from tests.viewer.fixtures import add_reflection, change_manifest, file_entry
 
@@ -32,8 +33,7 @@ def asset(tmp_path_factory: pytest.TempPathFactory) -> Path:
     make_asset(folder, layers=3, frames=2, resolution=96)
     add_reflection(folder)
     camera = write_poster(folder / "poster.jpg", parse_manifest(folder / "manifest.json"), 640, 92)
-    poster = file_entry(folder / "poster.jpg") | {"width": camera.width, "height": camera.height}
-    poster |= {"K": camera.K.tolist(), "w2c": camera.w2c.tolist(), "background": list(BACKGROUND)}
+    poster = file_entry(folder / "poster.jpg") | view_of(camera) | {"background": list(BACKGROUND)}
     change_manifest(folder, lambda value: value.update(poster=poster))
     return folder
 

@@ -10,8 +10,10 @@ import pytest
 from facefolds_core.asset import read_asset
 from facefolds_core.geometry.sphere_uv import uv_to_st
 from tests.assets import MOVING, TRACK, make_asset
-from tests.viewer.conftest import NewPlayer, Player, page_of_yours
+from tests.scenes import look_at_origin, view_of
+from tests.viewer.conftest import NewPlayer, Player, element, page_of_yours
 
+BARE = 'controls="none"'
 PLACE = (0.12, -0.1)
 """u, v."""
 SPOT = """const [box, own] = [document.querySelector('#spot').getBoundingClientRect(), e.getBoundingClientRect()];
@@ -20,14 +22,6 @@ HOTSPOT = (
     f'<button slot="hotspot-a" id="spot" data-surface="{PLACE[0]} {PLACE[1]} 1" style="width: 4px; height: 4px; '
     'padding: 0; border: 0"></button>'
 )
-
-
-def opened(new_player: NewPlayer, asset: Path, inner: str, attributes: str = "") -> Player:
-    player = new_player({"asset": asset}, viewport={"width": 400, "height": 300})
-    element = f'<facefolds-player src="asset/" style="height: 300px" controls="none" {attributes}>{inner}'
-    page_of_yours(player, f"{element}</facefolds-player>")
-    player.wait("e.level === 'full'")
-    return player
 
 
 def point_of(asset: Path) -> np.ndarray:
@@ -52,7 +46,7 @@ def place_of(player: Player, point: np.ndarray) -> object:
 
 
 def test_a_hotspot_stands_at_its_place_from_every_side(new_player: NewPlayer, rich: Path) -> None:
-    player = opened(new_player, rich, HOTSPOT)
+    player = element(new_player, rich, BARE, HOTSPOT)
     point = point_of(rich)
     for azimuth in (0, 25, -30):
         player.run("e.state = {view: {azimuth: v}}; await new Promise((r) => setTimeout(r, 200))", azimuth)
@@ -64,7 +58,7 @@ def test_a_hotspot_follows_a_head_that_moves(new_player: NewPlayer, tmp_path: Pa
     """From frame to frame, as it plays, and back to rest where the head is held still."""
     asset = tmp_path / "asset"
     make_asset(asset, layers=3, frames=3, resolution=64, source=MOVING)
-    player = opened(new_player, asset, HOTSPOT, 'loop="false"')
+    player = element(new_player, asset, f'{BARE} loop="false"', HOTSPOT)
     point = point_of(asset)
     places = [place_of(player, TRACK.at(frame).apply(point)) for frame in range(3)]
     for frame in (0, 2, 1):
@@ -79,21 +73,15 @@ def test_a_hotspot_follows_a_head_that_moves(new_player: NewPlayer, tmp_path: Pa
 
 
 def test_a_place_that_is_turned_away_says_so(new_player: NewPlayer, rich: Path) -> None:
-    player = opened(new_player, rich, HOTSPOT)
-    player.run(
-        "e.setCamera({K: [[100, 0, 32], [0, 100, 32], [0, 0, 1]], width: 64, height: 64,"
-        "w2c: [[0, 1, 0, 0], [0, 0, -1, 0], [-1, 0, 0, 2]]}); await new Promise((r) => setTimeout(r, 200))"
-    )
-    assert player.run("return document.querySelector('#spot').hasAttribute('data-visible')") is True
-    player.run(
-        "e.setCamera({K: [[100, 0, 32], [0, 100, 32], [0, 0, 1]], width: 64, height: 64,"
-        "w2c: [[0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 2]]}); await new Promise((r) => setTimeout(r, 200))"
-    )
-    assert player.run("return document.querySelector('#spot').hasAttribute('data-visible')") is False
+    player = element(new_player, rich, BARE, HOTSPOT)
+    code = "e.setCamera(v); await new Promise((r) => setTimeout(r, 200)); return document.querySelector('#spot')"
+    for azimuth, visible in ((0, True), (180, False)):
+        camera = view_of(look_at_origin("camera", azimuth, 0, 64))
+        assert player.run(f"{code}.hasAttribute('data-visible')", camera) is visible, azimuth
 
 
 def test_the_surface_under_a_point_gives_a_hotspot_there(new_player: NewPlayer, rich: Path) -> None:
-    player = opened(new_player, rich, HOTSPOT)
+    player = element(new_player, rich, BARE, HOTSPOT)
     surface = player.run(
         "return e.surfaceFromPoint(e.getBoundingClientRect().x + 210, e.getBoundingClientRect().y + 130)"
     )

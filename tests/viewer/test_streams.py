@@ -14,11 +14,11 @@ from playwright.sync_api import Route
 
 from facefolds_core.asset import read_asset
 from tests.pictures import GREY, five_cameras, means_of_frames, psnr
+from tests.scenes import view_of
 from tests.streamed import streamed_asset
-from tests.viewer.conftest import NewPlayer, Player
+from tests.viewer.conftest import NO_WEBCODECS, NewPlayer, Player
 
 CAMERA = five_cameras(48)[0]
-NO_WEBCODECS = "delete globalThis.VideoDecoder"
 DECODERS = pytest.mark.parametrize("script", ["", NO_WEBCODECS], ids=["WebCodecs", "hls.js"])
 FRAMES = 46
 SECTION: dict[str, Any] = {
@@ -99,8 +99,7 @@ def test_no_wrong_frame_while_levels_change(
     new_player: NewPlayer, take: Path, pictures: dict[str, list[np.ndarray]]
 ) -> None:
     player = opened(new_player({"asset": take}))
-    size = {"width": CAMERA.width, "height": CAMERA.height}
-    seen = player.run(RECORD, {"K": CAMERA.K.tolist(), "w2c": CAMERA.w2c.tolist(), **size})
+    seen = player.run(RECORD, view_of(CAMERA))
     assert {level for _, level, _ in seen} == {"small", "full"} and len(seen) > 10
     for frame, level, text in seen:
         picture = np.frombuffer(base64.b64decode(text), np.uint8).reshape(CAMERA.height, CAMERA.width, 4)[..., :3] / 255
