@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import importlib
-import os
-import subprocess
 import sys
 from pathlib import Path
 
@@ -14,6 +12,7 @@ from typer.testing import CliRunner
 import facefolds_core
 from facefolds_core.cli import COMMANDS, app
 from tests.assets import make_asset
+from tests.processes import printed
 
 EXTRAS = "torch numba scipy trimesh pymeshlab cv2 pyarrow safetensors matplotlib jinja2 yaml dvc dvclive rpack tqdm"
 READER = """
@@ -56,35 +55,28 @@ def test_an_unknown_name() -> None:
         facefolds_core.splats  # noqa: B018
 
 
-def test_an_asset_is_read_checked_and_rendered_without_the_extras(tmp_path: Path, project_root: Path) -> None:
+def test_an_asset_is_read_checked_and_rendered_without_the_extras(tmp_path: Path) -> None:
     make_asset(tmp_path / "asset", layers=2, frames=1, resolution=32)
-    command = [sys.executable, "-c", READER, str(tmp_path / "asset"), EXTRAS]
-    environment = {**os.environ, "PYTHONPATH": str(project_root)}
-    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
+    printed(READER, str(tmp_path / "asset"), EXTRAS)
 
 
-def test_help_lists_every_command_and_imports_none(project_root: Path) -> None:
+def test_help_lists_every_command_and_imports_none() -> None:
     code = (
         "import sys; from facefolds_core.cli import app\n"
         "try: app(['--help'])\n"
         "finally: print([m for m in sys.modules if m.startswith('facefolds_core.cli.') or m == 'numpy'])"
     )
-    environment = {**os.environ, "PYTHONPATH": str(project_root)}
-    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=False)
-    assert all(f"  {name} " in done.stdout for name in COMMANDS), done.stdout + done.stderr
-    assert done.stdout.rstrip().endswith("[]")
+    said = printed(code)
+    assert all(f"  {name} " in said for name in COMMANDS), said
+    assert said.endswith("[]")
 
 
-def test_stages_that_ask_no_model_do_without_torch(project_root: Path) -> None:
+def test_stages_that_ask_no_model_do_without_torch() -> None:
     """It takes a second to import, in each stage of each subject."""
-    stages = "configure reconstruct decimate texture bake compress"
     code = "import importlib, sys\nfor name in sys.argv[1].split():\n    importlib.import_module(f'stages.{name}')\n"
-    code += "    assert 'torch' not in sys.modules, name"
-    environment = {**os.environ, "PYTHONPATH": str(project_root)}
-    command = [sys.executable, "-c", code, stages]
-    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
+    printed(
+        code + "    assert 'torch' not in sys.modules, name", "configure reconstruct decimate texture bake compress"
+    )
 
 
 def test_a_command_without_its_extra_names_it(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from pathlib import Path
 from typing import get_args
 
@@ -19,6 +17,7 @@ from facefolds_core.cli import app
 from facefolds_core.params import Subject, compress, subject
 from facefolds_core.registry import EXPORTERS, SOURCES, Registry
 from tests.assets import make_asset
+from tests.processes import printed
 
 
 def test_every_source_reads() -> None:
@@ -59,9 +58,7 @@ def test_another_entry_is_a_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     assert Registry("facefolds_core.many").names == ("one", "two")
 
 
-def test_parameters_know_the_names_without_the_modules(project_root: Path) -> None:
-    code = "import sys, facefolds_core.params; print(*sys.modules, sep='\\n')"
-    done = subprocess.run([sys.executable, "-c", code], cwd=project_root, capture_output=True, text=True, check=True)
-    imported = done.stdout.split()
+def test_parameters_know_the_names_without_the_modules() -> None:
+    imported = printed("import sys, facefolds_core.params; print(*sys.modules)").split()
     assert "facefolds_core.params" in imported
     assert not [name for name in imported if name.startswith(("facefolds_core.captures", "facefolds_core.asset"))]

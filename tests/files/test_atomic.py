@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import errno
 import os
-import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -15,6 +13,7 @@ import pytest
 
 from facefolds_core.errors import UserError
 from facefolds_core.files.writing import MARK, PREFIX, atomic_file, atomic_folder, clear_temporaries, write_text
+from tests.processes import printed
 
 
 def names(folder: Path) -> list[str]:
@@ -115,11 +114,8 @@ assert step > 8 and outcomes == {"old", "new"}, (step, outcomes)
 
 
 @pytest.mark.parametrize("kind", ["file", "folder"])
-def test_a_kill_at_any_step_leaves_a_whole_old_or_new_one(kind: str, tmp_path: Path, project_root: Path) -> None:
-    environment = {**os.environ, "PYTHONPATH": str(project_root)}
-    command = [sys.executable, "-c", KILLS, str(tmp_path), kind]
-    done = subprocess.run(command, env=environment, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
+def test_a_kill_at_any_step_leaves_a_whole_old_or_new_one(kind: str, tmp_path: Path) -> None:
+    printed(KILLS, str(tmp_path), kind)
 
 
 def test_a_failure_to_move_in_puts_the_old_folder_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

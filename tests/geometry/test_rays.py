@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from facefolds_core.geometry.rays import MISS, EmbreeMesh, TriangleHits, hits_in, moeller_trumbore
+from tests.assets import grid_faces
 
 
 def brute_force_hits(
@@ -27,10 +28,7 @@ def folded_sheet(rng: np.random.Generator, n: int = 12) -> tuple[np.ndarray, np.
     x = 0.4 * np.sin(5 * a) + rng.normal(0, 0.05, a.shape)
     y = 0.3 * (a + 1.2 * np.sin(4 * a)) + rng.normal(0, 0.02, a.shape)
     vertices = np.stack([x, y, 0.3 * b], -1).reshape(-1, 3).astype(np.float32)
-    i = np.arange(n * n).reshape(n, n)
-    quads = [i[:-1, :-1].ravel(), i[1:, :-1].ravel(), i[:-1, 1:].ravel(), i[1:, 1:].ravel()]
-    faces = np.concatenate([np.stack(quads[:3], 1), np.stack([quads[1], quads[3], quads[2]], 1)]).astype(np.int32)
-    return vertices, faces
+    return vertices, grid_faces(n)
 
 
 def rays(rng: np.random.Generator, count: int) -> tuple[np.ndarray, np.ndarray]:
@@ -80,10 +78,8 @@ def test_no_ray_slips_through_shared_edges() -> None:
     n = 9
     y, z = np.meshgrid(np.linspace(-1, 1, n), np.linspace(-1, 1, n), indexing="ij")
     vertices = np.stack([0.3 * y * z, y, z], -1).reshape(-1, 3).astype(np.float32)
-    i = np.arange(n * n).reshape(n, n)
-    a, b, c, d = i[:-1, :-1].ravel(), i[1:, :-1].ravel(), i[:-1, 1:].ravel(), i[1:, 1:].ravel()
-    faces = np.concatenate([np.stack([a, b, c], 1), np.stack([b, d, c], 1)]).astype(np.int32)
-    ends = vertices[np.stack([b, c], 1)].astype(float)  # the diagonals, which two triangles share
+    faces = grid_faces(n)
+    ends = vertices[faces[: len(faces) // 2, 1:]].astype(float)  # the diagonals, which two triangles share
     share = rng.uniform(0, 1, (200, len(ends), 1))
     targets = (share * ends[:, 0] + (1 - share) * ends[:, 1]).reshape(-1, 3)
     origins = np.broadcast_to([1.1, 0.03, 0.02], targets.shape)

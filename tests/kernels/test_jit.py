@@ -4,9 +4,6 @@ from __future__ import annotations
 
 import ast
 import math
-import os
-import subprocess
-import sys
 import textwrap
 from pathlib import Path
 
@@ -15,18 +12,14 @@ import pytest
 
 from facefolds_core.kernels import jit
 from facefolds_core.kernels.jit import fingerprint, kernel
+from tests.processes import printed
 
 NUMBA_COMPILERS = {"njit", "jit", "vectorize", "guvectorize", "cfunc", "stencil", "generated_jit", "experimental"}
 
 
-def run_python(folder: Path, code: str, **environment: str) -> str:
+def run_python(folder: Path, code: str) -> str:
     """The last line that `code` prints in a process of its own, with numba's cache in `folder`."""
-    root = str(Path(__file__).resolve().parents[2])
-    settings = {"NUMBA_CACHE_DIR": str(folder / "cache"), "PYTHONPATH": f"{folder}{os.pathsep}{root}", **environment}
-    command = [sys.executable, "-B", "-c", textwrap.dedent(code)]
-    done = subprocess.run(command, cwd=folder, env={**os.environ, **settings}, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    return done.stdout.strip().splitlines()[-1]
+    return printed(textwrap.dedent(code), folder=folder, NUMBA_CACHE_DIR=str(folder / "cache")).splitlines()[-1]
 
 
 KERNEL = """

@@ -6,13 +6,12 @@ cache and has another number of threads.
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
 import textwrap
 from pathlib import Path
 
 import pytest
+
+from tests.processes import printed
 
 SCRIPTS = {
     "capture": """
@@ -93,20 +92,13 @@ print(digest.hexdigest())
         *(pytest.param(name, marks=pytest.mark.nightly) for name in ("capture", "subject", "train", "decimate")),
     ],
 )
-def test_the_first_run_equals_later_ones(stage: str, tmp_path: Path, project_root: Path) -> None:
+def test_the_first_run_equals_later_ones(stage: str, tmp_path: Path) -> None:
     code = FRAME.format(body=textwrap.dedent(SCRIPTS[stage]))
     found = []
     for run, threads in (("cold", 2), ("warm", 1)):
         (tmp_path / run).mkdir()
-        settings = {
-            "NUMBA_CACHE_DIR": str(tmp_path / "cache"),
-            "PYTHONPATH": str(project_root),
-            "NUMBA_NUM_THREADS": str(threads),
-            "OMP_NUM_THREADS": str(threads),
-        }
-        command = [sys.executable, "-c", code, str(tmp_path / run)]
-        done = subprocess.run(command, env={**os.environ, **settings}, cwd=tmp_path, capture_output=True, text=True)
-        assert done.returncode == 0, done.stderr
-        found.append(done.stdout.strip().splitlines()[-1])
+        settings = {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+        settings |= dict.fromkeys(("NUMBA_NUM_THREADS", "OMP_NUM_THREADS"), str(threads))
+        found.append(printed(code, str(tmp_path / run), folder=tmp_path, **settings).splitlines()[-1])
     assert found[0] == found[1]
     assert list((tmp_path / "cache").rglob("*.nbc"))

@@ -10,6 +10,7 @@ import pytest
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.rendering.raster import cast_layers
 from facefolds_core.rendering.reference import AssetCaster
+from tests.assets import grid_faces
 from tests.scenes import look_at_origin
 
 
@@ -26,10 +27,9 @@ def bumpy(seed: int, n: int = 24) -> TexturedMesh:
     rng = np.random.default_rng(seed)
     t, s = np.meshgrid(np.linspace(0, 1, n), np.linspace(0, 1, n), indexing="ij")
     points = np.stack([rng.uniform(-0.15, 0.15, s.shape), s - 0.5, 0.5 - t], -1).reshape(-1, 3)
-    index = np.arange(n * n).reshape(n, n)
-    a, b, c, d = (x.reshape(-1) for x in (index[:-1, :-1], index[:-1, 1:], index[1:, :-1], index[1:, 1:]))
-    faces = np.concatenate([np.stack([a, c, b], 1), np.stack([b, c, d], 1)]).astype(np.int32)
-    return TexturedMesh(points.astype(np.float32), faces, np.stack([s, t], -1).reshape(-1, 2).astype(np.float32))
+    return TexturedMesh(
+        points.astype(np.float32), grid_faces(n), np.stack([s, t], -1).reshape(-1, 2).astype(np.float32)
+    )
 
 
 @pytest.mark.parametrize("angles", [(0, 0), (60, 30), (85, -5), (180, 0)])

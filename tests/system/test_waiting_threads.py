@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
-
 import pytest
 
 from facefolds_core.system.processes import THREADS, with_threads
+from tests.processes import printed
 
 SPIN, BLAS = "GOMP_SPINCOUNT", "OPENBLAS_NUM_THREADS"
 
@@ -16,16 +13,13 @@ SPIN, BLAS = "GOMP_SPINCOUNT", "OPENBLAS_NUM_THREADS"
 @pytest.mark.parametrize("package", ["stages", "bench"])
 @pytest.mark.parametrize(("given", "expected"), [({}, "0 1"), ({SPIN: "1000", BLAS: "2"}, "1000 2")])
 def test_the_environment_has_the_last_word(package: str, given: dict[str, str], expected: str) -> None:
-    environment = {key: value for key, value in os.environ.items() if key not in (SPIN, BLAS)} | given
     code = f"import {package}, os; print(os.environ[{SPIN!r}], os.environ[{BLAS!r}])"
-    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == expected
+    assert printed(code, **{SPIN: None, BLAS: None, **given}) == expected
 
 
 def test_no_stage_imports_numpy_before_the_threads_are_set() -> None:
     code = "import stages, sys; print([name for name in ('numpy', 'scipy', 'torch') if name in sys.modules])"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "[]"
+    assert printed(code) == "[]"
 
 
 def test_shares_of_a_machine_leave_openblas_one_thread() -> None:
