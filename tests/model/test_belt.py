@@ -16,18 +16,12 @@ from facefolds_core.model import load_model, radial, save_model
 from facefolds_core.model.radial import RadialManifolds
 from facefolds_core.model.radial_kernel import SKIP, bounds, crossing_distances, heights
 from facefolds_core.model.storage import ExplicitSpec, build_model
+from tests.model.manifolds import bumpy, check_compiled, check_gradient
 
 C = (-0.25, 0.0, 0.05)
 SLANTED = Chart(C, Belt(0.2, 0.3))
 BROAD = (-1.2, 0.7, -1.4, 1.4)
 SPEC = ExplicitSpec(centre=C, window=(-1.2, 0.7, -1.4, 1.4), nodes=(6, 7), texels=(8, 9), num_layers=2, num_frames=2)
-
-
-def bumpy(chart: Chart = SLANTED, window: tuple[float, float, float, float] = BROAD) -> RadialManifolds:
-    generator = torch.Generator().manual_seed(0)
-    coarse = torch.randn(1, 1, 6, 6, generator=generator)
-    bumps = torch.nn.functional.interpolate(coarse, size=(48, 60), mode="bicubic")[0, 0]
-    return RadialManifolds(chart, window, 0.25 + 0.01 * bumps, torch.full((48, 60), 0.01), 4)
 
 
 def rays_around(count: int, seed: int = 0) -> tuple[Tensor, Tensor]:
@@ -67,22 +61,13 @@ def test_a_column_is_a_cylinder(grad: bool) -> None:
 
 
 def test_compiled_search_matches_the_reference() -> None:
-    manifolds = bumpy()
-    origins, directions = rays_around(800)
-    with torch.no_grad():
-        compiled = manifolds.crossings(origins, directions)
-        reference = manifolds.reference_crossings(origins, directions)
-    same = compiled.hit == reference.hit
-    assert same.float().mean() > 0.995  # a grazing ray may be met by one search and not by the other
-    both = compiled.hit & reference.hit
-    error = (compiled.distance - reference.distance)[both].abs()
-    assert (error < 1e-4).float().mean() > 0.995
-    assert error.median() < 1e-6
-    uv, radius = manifolds.chart.uv(compiled.points[both])
+    manifolds = bumpy(SLANTED, BROAD, 0.25, 60)
+    found = check_compiled(manifolds, *rays_around(800), share=0.995)
+    uv, radius = manifolds.chart.uv(found.points[found.hit])
     assert manifolds.chart.below(uv).float().mean() > 0.2
     assert (uv[:, 1].abs() > 1.05).float().mean() > 0.1
     rho, _ = manifolds.radii_at(uv)
-    layer = both.nonzero()[:, 1]
+    layer = found.hit.nonzero()[:, 1]
     assert (rho.gather(1, layer[:, None])[:, 0] - radius).abs().max() < 2e-5
 
 
@@ -91,7 +76,7 @@ def test_compiled_search_matches_the_reference() -> None:
 def test_strides_through_empty_space_miss_nothing(chart: Chart, holes: bool) -> None:
     """Samples are where they are without strides: the same to the last digit."""
     window = BROAD if chart.belt is not None else (-0.8, 0.7, -1.4, 1.4)
-    manifolds = bumpy(chart, window)
+    manifolds = bumpy(chart, window, 0.25, 60)
     rho, belt, edges = manifolds.radii().detach().numpy(), chart.numbers, np.array(window)
     if holes:
         rho[:, : rho.shape[1] // 2, -1] = np.nan
@@ -131,29 +116,19 @@ def test_a_steep_belt_on_a_thin_column() -> None:
 
 def test_distance_gradient_against_finite_differences() -> None:
     """Of a column seen from its front, behind the belt and across it, by rays that graze nothing."""
-    manifolds = bumpy()
+    manifolds = bumpy(SLANTED, BROAD, 0.25, 60)
     heights = torch.linspace(0, -0.4, 64)
     targets = manifolds.centre + torch.stack([0 * heights, 0 * heights, heights], -1)
     azimuths = 7 * torch.arange(64) % 64 / 32 - 1
     outward = torch.stack([torch.cos(azimuths), torch.sin(azimuths), 0.3 * torch.sin(5 * azimuths)], -1)
     origins, directions = targets + outward, torch.nn.functional.normalize(-outward, dim=1)
-    crossings = manifolds.crossings(origins, directions)
+    crossings = check_gradient(manifolds, origins, directions)
     below = manifolds.chart.below(manifolds.chart.uv(crossings.points.detach())[0])
     assert crossings.hit.all() and 0.5 < below.float().mean() < 0.95
-    weights = torch.linspace(-1, 1, crossings.distance.numel()).view_as(crossings.distance)
-    (crossings.distance * weights).sum().backward()
-    step = torch.cos(torch.arange(manifolds.middle.numel()).float()).view_as(manifolds.middle)
-    analytic = float((manifolds.middle.grad * step).sum())
-    values = []
-    for sign in (1, -1):
-        moved = RadialManifolds(SLANTED, BROAD, manifolds.middle.detach() + sign * 2e-4 * step, manifolds.halfwidth, 4)
-        with torch.no_grad():
-            values.append(float((moved.reference_crossings(origins, directions).distance * weights).sum()))
-    assert analytic == pytest.approx((values[0] - values[1]) / 4e-4, rel=0.03)
 
 
 def test_the_ball_around_c_holds_the_column() -> None:
-    manifolds = bumpy()
+    manifolds = bumpy(SLANTED, BROAD, 0.25, 60)
     uv = torch.tensor([[-1.2, 0.3], [0.7, 0.0], [-0.3, 1.4], [-1.2, -1.4]])
     radii, _ = manifolds.radii_at(uv)
     far = (manifolds.chart.points(uv, radii[:, 0]) - manifolds.centre).norm(dim=-1)

@@ -12,6 +12,7 @@ from facefolds_core.geometry.chart import Chart
 from facefolds_core.geometry.sphere_uv import points_to_uv, uv_to_directions
 from facefolds_core.model.radial import RadialManifolds
 from facefolds_core.model.storage import ExplicitSpec, build_model, load_model, read_spec, save_model
+from tests.model.manifolds import bumpy, check_compiled, check_gradient
 
 C = (-0.25, 0.0, 0.0)
 WINDOW = (-0.6, 0.6, -0.6, 0.6)
@@ -22,10 +23,7 @@ def _spheres(layers: int = 3) -> RadialManifolds:
 
 
 def _bumpy() -> RadialManifolds:
-    generator = torch.Generator().manual_seed(0)
-    coarse = torch.randn(1, 1, 6, 6, generator=generator)
-    bumps = torch.nn.functional.interpolate(coarse, size=(48, 40), mode="bicubic")[0, 0]
-    return RadialManifolds(Chart(C), WINDOW, 0.3 + 0.01 * bumps, torch.full((48, 40), 0.01), 4)
+    return bumpy(Chart(C), WINDOW, 0.3, 40)
 
 
 def _rays(count: int, seed: int = 0) -> tuple[torch.Tensor, torch.Tensor]:
@@ -52,18 +50,7 @@ def test_concentric_spheres_in_closed_form(grad: bool) -> None:
 
 
 def test_compiled_search_matches_the_reference() -> None:
-    manifolds = _bumpy()
-    origins, directions = _rays(500)
-    with torch.no_grad():
-        compiled = manifolds.crossings(origins, directions)
-        reference = manifolds.reference_crossings(origins, directions)
-    # A grazing ray may touch a bump between the samples of one search and not of the other.
-    same = compiled.hit == reference.hit
-    assert same.float().mean() > 0.998
-    both = compiled.hit & reference.hit
-    error = (compiled.distance - reference.distance)[both].abs()
-    assert (error < 1e-4).float().mean() > 0.995  # worst of the rest: another crossing of the same bump
-    assert error.median() < 1e-6
+    check_compiled(_bumpy(), *_rays(500), share=0.998)
 
 
 def test_layers_that_moved_are_met_where_they_are_now() -> None:
@@ -94,22 +81,7 @@ def test_there_is_no_surface_outside_the_window() -> None:
 
 
 def test_distance_gradient_against_finite_differences() -> None:
-    manifolds = _bumpy()
-    origins, directions = _rays(64, seed=2)
-    crossings = manifolds.crossings(origins, directions)
-    weights = torch.linspace(-1, 1, crossings.distance.numel()).view_as(crossings.distance) * crossings.hit
-    (crossings.distance * weights).sum().backward()
-    step = torch.cos(torch.arange(manifolds.middle.numel()).float()).view_as(manifolds.middle)
-    analytic = float((manifolds.middle.grad * step).sum())
-    values = []
-    for sign in (1, -1):
-        moved = RadialManifolds(
-            Chart(C), WINDOW, manifolds.middle.detach() + sign * 2e-4 * step, manifolds.halfwidth, 4
-        )
-        with torch.no_grad():
-            values.append(float((moved.reference_crossings(origins, directions).distance * weights).sum()))
-    numeric = (values[0] - values[1]) / 4e-4
-    assert analytic == pytest.approx(numeric, rel=0.03)
+    check_gradient(_bumpy(), *_rays(64, seed=2))
 
 
 def test_one_layer_is_the_middle() -> None:
