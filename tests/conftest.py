@@ -52,6 +52,17 @@ def rich(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return rich_asset(tmp_path_factory.mktemp("rich") / "asset")
 
 
+@pytest.fixture(scope="session")
+def vectors(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The conformance vectors, not to be changed."""
+    from tests.vectors import write_vectors
+
+    folder = tmp_path_factory.mktemp("made") / "vectors"
+    count = write_vectors(folder)
+    assert count == len(list((folder / "reference").iterdir())) == len(list((folder / "reference_points").iterdir()))
+    return folder
+
+
 @pytest.fixture
 def rich_copy(rich: Path, tmp_path: Path) -> Path:
     """The same, to spoil."""

@@ -17,14 +17,6 @@ from tests.asset.independent_reader import Player
 from tests.vectors import ASSETS, BACKGROUND, compare, main, write_vectors
 
 
-@pytest.fixture(scope="module")
-def vectors(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("made") / "vectors"
-    count = write_vectors(folder)
-    assert count == len(list((folder / "reference").iterdir())) == len(list((folder / "reference_points").iterdir()))
-    return folder
-
-
 def test_the_assets_are_sound(vectors: Path) -> None:
     assert [validate_asset(vectors / name) for name in ASSETS] == [[], []]
     assert read_asset(vectors / "stream").manifest.stream is not None

@@ -13,15 +13,8 @@ from typer.testing import CliRunner
 
 from facefolds_core.cli import app
 from facefolds_core.geometry.cameras import Camera
-from tests.vectors import compare, write_vectors
+from tests.vectors import compare
 from tests.viewer.conftest import NewPlayer
-
-
-@pytest.fixture(scope="module")
-def vectors(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("made") / "vectors"
-    write_vectors(folder)
-    return folder
 
 
 def views(vectors: Path, asset: str) -> list[dict[str, Any]]:
