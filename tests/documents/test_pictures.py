@@ -46,14 +46,12 @@ def test_what_was_just_made_is_not_stale(subject: Path) -> None:
     assert stale(subject, subject) == []
 
 
-def test_an_edited_picture_is_stale(subject: Path) -> None:
-    (subject / "a.jpg").write_text("2")
-    assert stale(subject, subject) == ["a.jpg: changed since it was made"]
-
-
-def test_other_results_make_a_picture_stale(subject: Path) -> None:
-    (subject / "scores").write_text("2")
-    assert stale(subject, subject) == ["a.jpg: made from another scores"]
+@pytest.mark.parametrize(
+    ("edited", "said"), [("a.jpg", "changed since it was made"), ("scores", "made from another scores")]
+)
+def test_an_edited_picture_and_other_results_are_stale(subject: Path, edited: str, said: str) -> None:
+    (subject / edited).write_text("2")
+    assert stale(subject, subject) == [f"a.jpg: {said}"]
 
 
 def test_other_options_make_a_picture_stale(subject: Path, monkeypatch: pytest.MonkeyPatch) -> None:
