@@ -181,7 +181,7 @@ def test_a_tracked_mesh_of_another_size_is_left_out_and_said(
     """All else is as without one, bit for bit: the same seed makes the same model."""
     models = []
     for name, radius in (("none", None), ("larger", 1.25 * OPAQUE[0].radius)):
-        scene = make_scene(tmp_path / name / "scene", size=64, surface_radius=radius, mattes=True)
+        scene = make_scene(tmp_path / name / "scene", size=32, surface_radius=radius, mattes=True)
         fit_explicit(scene, _params(), tmp_path / name / "log").save(tmp_path / name / "model")
         said = capsys.readouterr().out, (tmp_path / name / "model" / "fit.json").read_text()
         assert all(("left out" in words) == (name == "larger") for words in said)
