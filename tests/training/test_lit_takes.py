@@ -21,8 +21,7 @@ from facefolds_core.training.segments.frames import FrameFitter
 from facefolds_core.training.segments.loop import base_of, train_take
 from facefolds_core.training.segments.plan import plan_take
 from tests.geometry.test_track import about
-from tests.scenes import make_scene
-from tests.training.test_segments import FRAMES, params
+from tests.training.takes import FRAMES, filmed, params
 from tests.training.test_workers import files
 
 pytestmark = pytest.mark.slow
@@ -37,7 +36,7 @@ def lit(begin: Literal["rounds", "end"] = "rounds", **segments: object) -> Expli
 def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Scene, Path, Base]:
     """A take, and its base, which is given a reflection whether it helps or not."""
     folder = tmp_path_factory.mktemp("lit")
-    scene = make_scene(folder / "scene", size=32, frames=FRAMES, surface_radius=0.33, mattes=True)
+    scene = filmed(folder / "scene")
     with patch("facefolds_core.training.explicit.gloss.gain_on_cameras", lambda *_: 1.0):
         base = base_of(plan_take(scene, lit(), 2), scene, lit(), folder / "checkpoints" / "take", folder / "log")
     assert base.textures.reflection is not None and float(base.textures.reflection.environment.detach().max()) > 0

@@ -24,9 +24,9 @@ from facefolds_core.training.explicit.state import TextureState
 from facefolds_core.training.explicit.views import StillRays, trace_views
 from tests.geometry.test_track import about
 from tests.scenes import make_scene
+from tests.training.takes import params
 from tests.training.test_explicit_kernels import random_cut
 from tests.training.test_moving import TURNED, layers, rays
-from tests.training.test_segments import params
 
 
 @pytest.fixture(scope="module")

@@ -14,42 +14,19 @@ import pytest
 import torch
 from numpy.typing import NDArray
 
-from facefolds_core.captures.scene import Scene, read_scene
+from facefolds_core.captures.scene import Scene
 from facefolds_core.errors import UserError
 from facefolds_core.files.frame_store import FrameStore, write_frames
 from facefolds_core.files.writing import read_json
 from facefolds_core.geometry.track import Track
 from facefolds_core.model import load_model
 from facefolds_core.model.segmented import SegmentedTextures
-from facefolds_core.params import ExplicitParams, train_params
 from facefolds_core.training.segments.frames import FrameFitter
-from facefolds_core.training.segments.loop import base_of, fit_take, train_take
+from facefolds_core.training.segments.loop import base_of, fit_take
 from facefolds_core.training.segments.plan import plan_take
-from tests.scenes import make_scene
+from tests.training.takes import FRAMES, filmed, params, train
 
 pytestmark = pytest.mark.slow
-
-FRAMES = 5
-
-
-def params(**segments: object) -> ExplicitParams:
-    given = {
-        "preset": "fast",
-        "layers": 3,
-        "iterations": 30,
-        "geometry": {"rounds": [1.0], "round_iterations": 10},
-        "reflection": {"enabled": False},
-        "textures": {"steps_per_frame": 4},
-        "segments": {"joint_frames": 0, "key_frames": 2, "frames": 2, "steps": 3, **segments},
-    }
-    found = train_params(given)
-    assert isinstance(found, ExplicitParams)
-    return found
-
-
-def train(scene: Scene, folder: Path, **segments: object) -> Path:
-    train_take(scene, params(**segments), folder / "model", folder / "checkpoints", folder / "log")
-    return folder / "model"
 
 
 def same(one: Path, other: Path) -> bool:
@@ -75,21 +52,6 @@ def counted(most: int = 1000) -> Iterator[list[int]]:
         yield fitted
 
 
-@pytest.fixture(scope="module")
-def trained(tmp_path_factory: pytest.TempPathFactory) -> tuple[Scene, Path]:
-    folder = tmp_path_factory.mktemp("segments")
-    scene = make_scene(folder / "scene", size=32, frames=FRAMES, surface_radius=0.33, mattes=True)
-    train(scene, folder)
-    return scene, folder
-
-
-@pytest.fixture
-def again(trained: tuple[Scene, Path], tmp_path: Path) -> tuple[Scene, Path]:
-    """The same take with what a finished training leaves, in a folder of its own."""
-    shutil.copytree(trained[1], tmp_path / "take")
-    return read_scene(tmp_path / "take" / "scene"), tmp_path / "take"
-
-
 def error_of(scene: Scene, model: Path, frame: int, shown: int) -> float:
     """Mean squared difference of a held-out picture from what the model shows of frame `shown`."""
     index = scene.indices("holdout")[0]
@@ -99,22 +61,22 @@ def error_of(scene: Scene, model: Path, frame: int, shown: int) -> float:
     return float(np.square(rgb - scene.open_frames().image(index, frame).reshape(-1, 3) / 255).mean())
 
 
-def test_each_frame_is_shown_best_by_its_own_textures(trained: tuple[Scene, Path]) -> None:
-    scene, folder = trained
+def test_each_frame_is_shown_best_by_its_own_textures(take: tuple[Scene, Path]) -> None:
+    scene, folder = take
     for k in (0, 2, 4):
         assert error_of(scene, folder / "model", k, k) < error_of(scene, folder / "model", k, (k + 2) % FRAMES)
 
 
-def test_the_model_holds_base_and_segments(trained: tuple[Scene, Path]) -> None:
-    folder = trained[1] / "model"
+def test_the_model_holds_base_and_segments(take: tuple[Scene, Path]) -> None:
+    folder = take[1] / "model"
     assert sorted(p.name for p in (folder / "segments").iterdir()) == [f"{i:05d}.safetensors" for i in range(3)]
     textures = load_model(folder).textures
     assert isinstance(textures, SegmentedTextures) and textures.lengths == (2, 2, 1)
     assert textures.frame_colour.numel() == 0
 
 
-def test_between_frames_it_is_linear_across_segments(trained: tuple[Scene, Path]) -> None:
-    textures = load_model(trained[1] / "model").textures
+def test_between_frames_it_is_linear_across_segments(take: tuple[Scene, Path]) -> None:
+    textures = load_model(take[1] / "model").textures
     assert isinstance(textures, SegmentedTextures)
     uv, directions = torch.zeros(2, 2), torch.tensor([[-1.0, 0, 0]] * 2)
     both = textures.shade(uv, torch.zeros(2, dtype=torch.long), torch.tensor([1.5, 4.0]), directions)
@@ -122,10 +84,8 @@ def test_between_frames_it_is_linear_across_segments(trained: tuple[Scene, Path]
     torch.testing.assert_close(both.rgb, torch.cat([one.rgb for one in alone]))
 
 
-def test_a_killed_training_loses_the_segment_in_progress_only(again: tuple[Scene, Path]) -> None:
-    scene, folder = again
-    for path in (folder / "checkpoints" / "take").glob("segment-*"):
-        path.unlink()
+def test_a_killed_training_loses_the_segment_in_progress_only(unfitted: tuple[Scene, Path]) -> None:
+    scene, folder = unfitted
     with counted(most=3) as before, pytest.raises(KeyboardInterrupt):
         train(scene, folder)
     with counted() as after:
@@ -133,15 +93,15 @@ def test_a_killed_training_loses_the_segment_in_progress_only(again: tuple[Scene
     assert (before, after) == ([0, 1, 2], [2, 3, 4])
 
 
-def test_what_was_taken_up_is_what_is_made_in_one_go(trained: tuple[Scene, Path], again: tuple[Scene, Path]) -> None:
-    scene, folder = again
+def test_what_was_taken_up_is_what_is_made_in_one_go(take: tuple[Scene, Path], take_again: tuple[Scene, Path]) -> None:
+    scene, folder = take_again
     shutil.rmtree(folder / "checkpoints")
     train(scene, folder)
-    assert same(folder / "model", trained[1] / "model")
+    assert same(folder / "model", take[1] / "model")
 
 
-def test_frames_do_not_depend_on_their_segments(trained: tuple[Scene, Path], again: tuple[Scene, Path]) -> None:
-    scene, folder = again
+def test_frames_do_not_depend_on_their_segments(take: tuple[Scene, Path], take_again: tuple[Scene, Path]) -> None:
+    scene, folder = take_again
     with counted() as fitted:
         train(scene, folder, frames=3)
     assert fitted == []  # dealt anew, trained no more
@@ -150,11 +110,11 @@ def test_frames_do_not_depend_on_their_segments(trained: tuple[Scene, Path], aga
     with counted() as fitted:
         train(scene, folder, frames=5)
     assert fitted == [0, 1, 2, 3, 4]
-    assert same(folder / "model", trained[1] / "model")
+    assert same(folder / "model", take[1] / "model")
 
 
-def test_a_changed_frame_trains_itself_alone(again: tuple[Scene, Path]) -> None:
-    scene, folder = again
+def test_a_changed_frame_trains_itself_alone(take_again: tuple[Scene, Path]) -> None:
+    scene, folder = take_again
     keys = load_keys(folder)
     changed = next(k for k in range(FRAMES) if k not in keys)
     store = FrameStore(scene.folder / "frames.arrow")
@@ -176,32 +136,32 @@ def load_keys(folder: Path) -> list[int]:
 
 
 def test_a_model_is_saved_after_its_segments_have_gone_from_where_they_were_made(
-    trained: tuple[Scene, Path], again: tuple[Scene, Path]
+    take: tuple[Scene, Path], take_again: tuple[Scene, Path]
 ) -> None:
-    scene, folder = again
+    scene, folder = take_again
     fitted = fit_take(scene, params(), folder / "checkpoints", folder / "log")
     shutil.rmtree(folder / "checkpoints")
     fitted.save(folder / "saved")
-    assert same(folder / "saved", trained[1] / "model")
-    assert {p.name for p in (folder / "saved").iterdir()} == {p.name for p in (trained[1] / "model").iterdir()}
+    assert same(folder / "saved", take[1] / "model")
+    assert {p.name for p in (folder / "saved").iterdir()} == {p.name for p in (take[1] / "model").iterdir()}
 
 
 @pytest.mark.parametrize("keep", [0, 100, -8])
-def test_a_damaged_segment_is_named(keep: int, again: tuple[Scene, Path]) -> None:
-    path = again[1] / "model" / "segments" / "00001.safetensors"
+def test_a_damaged_segment_is_named(keep: int, take_again: tuple[Scene, Path]) -> None:
+    path = take_again[1] / "model" / "segments" / "00001.safetensors"
     content = path.read_bytes()
     path.unlink()  # it is a link
     path.write_bytes(content[:keep])
     with pytest.raises(UserError, match=r"00001\.safetensors"):
-        load_model(again[1] / "model")
+        load_model(take_again[1] / "model")
 
 
 @pytest.mark.parametrize("before", [0, 1])
 def test_another_base_than_before_is_said(
-    before: int, trained: tuple[Scene, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    before: int, take: tuple[Scene, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """A changed frame that is chosen as a key frame trains all others anew, too."""
-    scene, _ = trained
+    scene, _ = take
     for number in range(before):
         (tmp_path / f"base-{number}").mkdir()
     training = "facefolds_core.training.segments.loop.train_base"
@@ -212,7 +172,7 @@ def test_another_base_than_before_is_said(
 
 def test_a_head_that_turns_is_fitted_frame_by_frame_too(tmp_path: Path) -> None:
     """Its rays meet other texels in each frame. It is the sphere itself, said to have shifted by next to nothing."""
-    scene = make_scene(tmp_path / "scene", size=32, frames=FRAMES, surface_radius=0.33, mattes=True)
+    scene = filmed(tmp_path / "scene")
     shifts = np.outer(np.linspace(-1e-4, 1e-4, FRAMES), [0, 1, 0])
     scene = replace(scene, poses=Track.of([np.eye(3)] * FRAMES, shifts))
     with counted() as fitted:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import shutil
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -11,7 +10,7 @@ from pathlib import Path
 import psutil
 import pytest
 
-from facefolds_core.captures.scene import Scene, read_scene
+from facefolds_core.captures.scene import Scene
 from facefolds_core.errors import UserError
 from facefolds_core.training.segments import workers
 from facefolds_core.training.segments.base import Base
@@ -20,36 +19,17 @@ from facefolds_core.training.segments.forecast import forecast, processes_for
 from facefolds_core.training.segments.loop import base_of
 from facefolds_core.training.segments.plan import Segment, plan_take
 from facefolds_core.training.segments.workers import fit_in_processes
-from tests.scenes import make_scene
-from tests.training.test_segments import FRAMES, params, train
+from tests.training.takes import params
 
 pytestmark = pytest.mark.slow
-
-
-@pytest.fixture(scope="module")
-def serial(tmp_path_factory: pytest.TempPathFactory) -> tuple[Scene, Path]:
-    """A take, trained in one process."""
-    folder = tmp_path_factory.mktemp("workers")
-    scene = make_scene(folder / "scene", size=32, frames=FRAMES, surface_radius=0.33, mattes=True)
-    train(scene, folder, processes=1)
-    return scene, folder
-
-
-@pytest.fixture
-def unfitted(serial: tuple[Scene, Path], tmp_path: Path) -> Path:
-    """The take with its base and no segment."""
-    shutil.copytree(serial[1], tmp_path / "take")
-    for path in (tmp_path / "take" / "checkpoints" / "take").glob("segment-*"):
-        path.unlink()
-    return tmp_path / "take"
 
 
 class Fit:
     """The segments of a take, fitted in processes."""
 
-    def __init__(self, folder: Path, processes: int = 2) -> None:
+    def __init__(self, take: tuple[Scene, Path], processes: int = 2) -> None:
         self.processes = processes
-        scene = read_scene(folder / "scene")
+        scene, folder = take
         self.place = folder / "checkpoints" / "take"
         self.plan = plan_take(scene, params(), forecast(scene, params()).key_frames or 1)
         self.base: Base = base_of(self.plan, scene, params(), self.place, folder / "log")
@@ -81,7 +61,7 @@ def files(folder: Path) -> dict[str, bytes]:
     return found
 
 
-def test_what_a_lost_process_had_is_fitted_again(serial: tuple[Scene, Path], unfitted: Path) -> None:
+def test_what_a_lost_process_had_is_fitted_again(take: tuple[Scene, Path], unfitted: tuple[Scene, Path]) -> None:
     killed: list[int] = []
 
     def kill(_: Segment) -> None:
@@ -95,12 +75,12 @@ def test_what_a_lost_process_had_is_fitted_again(serial: tuple[Scene, Path], unf
     assert killed == [2]
     assert sorted(segment.number for segment in fit.done) == [0, 1, 2]
     made = {path.name: path.read_bytes() for path in fit.place.glob("segment-*")}
-    assert made == {path.name: path.read_bytes() for path in (serial[1] / "checkpoints" / "take").glob("segment-*")}
+    assert made == {path.name: path.read_bytes() for path in (take[1] / "checkpoints" / "take").glob("segment-*")}
     assert not list(fit.place.glob("rays-*"))
 
 
 def test_processes_that_are_lost_again_and_again_end_the_training(
-    unfitted: Path, monkeypatch: pytest.MonkeyPatch
+    unfitted: tuple[Scene, Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     fit = Fit(unfitted)
     monkeypatch.setattr(workers, "_begin", partial(os._exit, 7))
@@ -109,7 +89,7 @@ def test_processes_that_are_lost_again_and_again_end_the_training(
     assert "processes: 1" in str(caught.value) and "1, 2, 3" in str(caught.value)
 
 
-def test_an_error_ends_all_processes(unfitted: Path) -> None:
+def test_an_error_ends_all_processes(unfitted: tuple[Scene, Path]) -> None:
     def interrupt(_: Segment) -> None:
         raise KeyboardInterrupt
 
@@ -119,7 +99,7 @@ def test_an_error_ends_all_processes(unfitted: Path) -> None:
     assert not processes()
 
 
-def test_what_a_user_can_mend_comes_back(unfitted: Path) -> None:
+def test_what_a_user_can_mend_comes_back(unfitted: tuple[Scene, Path]) -> None:
     fit = Fit(unfitted, processes=1)
     (fit.base.folder / "surroundings.safetensors").write_bytes(b"")
     with pytest.raises(UserError, match="surroundings"):
@@ -127,9 +107,9 @@ def test_what_a_user_can_mend_comes_back(unfitted: Path) -> None:
 
 
 def test_processes_are_as_many_as_work_and_memory_allow(
-    serial: tuple[Scene, Path], monkeypatch: pytest.MonkeyPatch
+    take: tuple[Scene, Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    scene = serial[0]
+    scene = take[0]
     monkeypatch.setattr("numba.get_num_threads", lambda: 8)
     long, texels = params(steps=1000), 10**5
     room = psutil.virtual_memory()._replace(available=10**12)
