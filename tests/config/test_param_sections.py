@@ -25,7 +25,6 @@ from facefolds_core.params import (
 )
 from facefolds_core.params.renamed import GONE, RENAMED
 
-MINIMAL = "subjects:\n  a: {source: actor, path: x}\n"
 OLD = {old.partition(".")[2] for old in RENAMED}
 
 
@@ -73,15 +72,6 @@ def test_only_finite_numbers_in_bounds_are_taken_for_numbers(
         with pytest.raises(UserError) as caught:
             checked(stage, section, nested(path, wrong))
         assert caught.value.place is not None and caught.value.place.startswith(f"{stage}.{path}")
-
-
-@pytest.mark.parametrize("fps", ["1.0e-300", "1.0e+300", "0", "-30", ".nan", ".inf", "'30'", "true"])
-def test_absurd_frame_rates_are_refused(tmp_path: Path, fps: str) -> None:
-    file = tmp_path / "params.yaml"
-    file.write_text(f"subjects:\n  a: {{source: actor, path: x, fps: {fps}}}\n")
-    with pytest.raises(UserError) as caught:
-        load_params(file)
-    assert "subjects.a.fps" in str(caught.value)
 
 
 def test_whole_numbers_and_lists_do_for_floats_and_tuples() -> None:

@@ -86,6 +86,10 @@ def test_a_change_of_one_section_changes_one_file_only(tmp_path: Path) -> None:
         (MINIMAL + "texture: {resolution: '64'}\n", "texture.resolution"),
         (MINIMAL + "texture: {resolution: true}\n", "texture.resolution"),
         (MINIMAL + "capture: {fps: 1.0e+300}\n", "capture.fps"),
+        *(
+            (f"subjects:\n  a: {{source: actor, path: x, fps: {fps}}}\n", "subjects.a.fps")
+            for fps in ("1.0e-300", "1.0e+300", "0", "-30", ".nan", ".inf", "'30'", "true")
+        ),
         (MINIMAL + "texture: {resolution: 0}\n", "texture.resolution"),
         (MINIMAL + "texture: {resolution: .nan}\n", "texture.resolution"),
         (MINIMAL + "texture: {size: 3}\n", "texture.size"),

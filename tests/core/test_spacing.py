@@ -9,19 +9,17 @@ from facefolds_core.spacing import spread
 
 
 @pytest.mark.parametrize(
-    ("count", "most", "found"),
-    [(10, 3, [0, 4, 9]), (12, 3, [0, 6, 11]), (2, 5, [0, 1]), (1, 1, [0]), (9, 1, [0]), (0, 4, []), (4, 0, [])],
+    ("count", "most", "ends", "middles"),
+    [
+        *((10, 3, [0, 4, 9], [1, 4, 8]), (12, 3, [0, 6, 11], [2, 6, 10]), (10, 2, [0, 9], [2, 7]), (9, 1, [0], [4])),
+        *((2, 5, [0, 1], [0, 1]), (1, 1, [0], [0]), (0, 4, [], []), (4, 0, [], [])),
+    ],
 )
-def test_the_first_and_the_last_are_among_them(count: int, most: int, found: list[int]) -> None:
-    assert spread(range(count), most) == found
-
-
-@pytest.mark.parametrize(
-    ("count", "most", "found"),
-    [(10, 2, [2, 7]), (12, 3, [2, 6, 10]), (2, 5, [0, 1]), (1, 1, [0]), (9, 1, [4]), (0, 4, []), (4, 0, [])],
-)
-def test_without_the_ends_each_stands_in_the_middle_of_its_part(count: int, most: int, found: list[int]) -> None:
-    assert spread(range(count), most, ends=False) == found
+def test_ends_are_among_them_or_each_is_the_middle_of_its_part(
+    count: int, most: int, ends: list[int], middles: list[int]
+) -> None:
+    assert spread(range(count), most) == ends
+    assert spread(range(count), most, ends=False) == middles
 
 
 @pytest.mark.parametrize("ends", [True, False])
