@@ -61,6 +61,16 @@ def grid_faces(n: int) -> NDArray[np.int32]:
     return np.concatenate([np.stack([a, c, b], -1).reshape(-1, 3), np.stack([b, c, d], -1).reshape(-1, 3)])
 
 
+@dataclass(frozen=True)
+class Meshes:
+    """For casts of rays, which look at no texture."""
+
+    layers: list[TexturedMesh]
+
+    def frame(self, k: int) -> NDArray[np.uint8]:
+        raise NotImplementedError
+
+
 def cap_texture(layer: int, frame: int, resolution: int) -> NDArray[np.uint8]:
     """(R, R, 4) RGBA: smooth waves that move with the frame, alpha from 0 at the rim to 255 in the middle."""
     s, t = np.meshgrid(*[(np.arange(resolution) + 0.5) / resolution] * 2)

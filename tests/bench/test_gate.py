@@ -67,9 +67,7 @@ def test_other_code_is_measured_again(
     assert len(ran) == times
 
 
-def test_a_fall_fails_aloud_until_it_is_accepted(
-    tmp_path: Path, ran: list[dict[str, Any]], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_fall_fails_aloud_until_it_is_accepted(tmp_path: Path, ran: list[dict[str, Any]]) -> None:
     better = {**GOOD, "psnr_moving": 30.0}
     Store(gate.KEPT, "gate", Found).add(Found(case="clutter", scores=better))
     said = invoke(gate.main, str(tmp_path), "--only", "clutter")

@@ -15,9 +15,9 @@ from facefolds_core.rendering.pixels import SIDE, finer, pixel_means, render
 from facefolds_core.rendering.raster import cast_layers
 from facefolds_core.rendering.reference import Layered
 from facefolds_core.rendering.reflection import reflected_colours
-from tests.assets import MOVING, make_asset
+from tests.assets import MOVING, Meshes, make_asset
 from tests.pictures import psnr
-from tests.rendering.test_raster import Meshes, bumpy
+from tests.rendering.test_raster import bumpy
 from tests.scenes import look_at_origin
 from tests.viewer.fixtures import random_reflection
 

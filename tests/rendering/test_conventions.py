@@ -2,32 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import pytest
 
-from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.geometry.sphere_uv import directions_to_uv, uv_to_st
 from facefolds_core.rendering import AssetCaster
-from tests.assets import WINDOW, cap_mesh
+from tests.assets import WINDOW, Meshes, cap_mesh
 from tests.scenes import CENTRE, first_hit, look_at_origin
 
 RADII = (0.36, 0.30)
 
 
-@dataclass(frozen=True)
-class Caps:
-    layers: tuple[TexturedMesh, ...]
-
-    def frame(self, k: int) -> np.ndarray:
-        raise NotImplementedError
-
-
 @pytest.mark.parametrize(("azimuth", "elevation"), [(0, 0), (35, 10), (-50, -20)])
 def test_texture_coordinates_are_those_of_the_sphere(azimuth: float, elevation: float) -> None:
     camera = look_at_origin("camera", azimuth, elevation, 48)
-    hits = AssetCaster(Caps(tuple(cap_mesh(radius, 96) for radius in RADII))).cast(camera)
+    hits = AssetCaster(Meshes([cap_mesh(radius, 96) for radius in RADII])).cast(camera)
     origins, directions = camera.rays()
     for i, radius in enumerate(RADII):
         distance, hit = first_hit(origins, directions, radius)

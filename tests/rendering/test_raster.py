@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,16 +10,8 @@ import pytest
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.rendering.raster import cast_layers
 from facefolds_core.rendering.reference import AssetCaster
-from tests.assets import grid_faces
+from tests.assets import Meshes, grid_faces
 from tests.scenes import look_at_origin
-
-
-@dataclass(frozen=True)
-class Meshes:
-    layers: list[TexturedMesh]
-
-    def frame(self, k: int) -> np.ndarray:
-        raise NotImplementedError
 
 
 def bumpy(seed: int, n: int = 24) -> TexturedMesh:
