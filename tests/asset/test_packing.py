@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -109,17 +112,11 @@ def test_too_large_a_picture_names_the_resolution_that_fits() -> None:
 def test_problems_are_found() -> None:
     good = AtlasLayout.pack([(64, 64)] * 2)
     x, y, w, h = good.rects[1]
-    moved = [
-        (
-            AtlasLayout(good.width, good.height, (0, 0, good.width, good.height + 2), good.alpha_rect, good.rects),
-            "inside",
-        ),
-        (AtlasLayout(good.width, good.height, good.colour_rect, good.colour_rect, good.rects), "overlap"),
-        (AtlasLayout(good.width, good.height, good.colour_rect, good.alpha_rect, (good.rects[0],) * 2), "overlap"),
-        (
-            AtlasLayout(good.width, good.height, good.colour_rect, good.alpha_rect, (good.rects[0], (x + 64, y, w, h))),
-            "not inside",
-        ),
+    wrong: list[tuple[dict[str, Any], str]] = [
+        ({"colour_rect": (0, 0, good.width, good.height + 2)}, "inside"),
+        ({"alpha_rect": good.colour_rect}, "overlap"),
+        ({"rects": (good.rects[0],) * 2}, "overlap"),
+        ({"rects": (good.rects[0], (x + 64, y, w, h))}, "not inside"),
     ]
-    for layout, word in moved:
-        assert any(word in problem for problem in layout.problems())
+    for changes, word in wrong:
+        assert any(word in problem for problem in replace(good, **changes).problems())
