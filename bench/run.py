@@ -101,7 +101,7 @@ def score_model(
         view = None
         for k, time in times.items():
             if (index, k) in truths:
-                turn = None if poses is None else poses.at(k).rotation
+                turn = None if poses is None else poses.at(k)
                 view = ModelView(model, scene.camera_in_head(index, k), turn) if view is None or poses else view
                 mask = masks.image(index, k)[..., 0] / 255.0 if masks is not None and (index, k) in masks else None
                 picture = shown(view.render(time)[variant])

@@ -149,7 +149,7 @@ def scores_of(scene: Scene, model: RadianceManifolds) -> Means:
             cutout = cutout_of("true", truth)
             assert truth.mask is not None and cutout is not None
             if scene.poses is not None:
-                view = ModelView(model, scene.camera_in_head(index, frame), scene.poses.at(frame).rotation)
+                view = ModelView(model, scene.camera_in_head(index, frame), scene.poses.at(frame))
             one = Rendering(*(view.render(float(frame))[k] for k in (0, 2)))
             picture = shown(one.over(params.background))
             off = np.square(picture - truth.picture).mean(-1)

@@ -19,6 +19,7 @@ from facefolds_core.files.writing import atomic_folder
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.geometry.sphere_uv import Window, st_to_uv, uv_to_directions
+from facefolds_core.geometry.torso import Torso
 from facefolds_core.geometry.track import Track
 from facefolds_core.params import CompressParams, MeshCodec, VideoCodec
 from tests.geometry.test_track import SHIFTS, TURNS
@@ -31,6 +32,9 @@ SOURCE = AssetSource(
 TRACK = Track.of(TURNS, SHIFTS)
 MOVING = replace(SOURCE, track=TRACK)
 """A head that moves, for three frames."""
+TORSO = Torso.at([0.0, 0.0, -1.0], -0.05, 0.1, TRACK.at(1))
+OVER_TORSO = replace(SOURCE, track=replace(TRACK, torso=TORSO))
+"""One that moves over a torso that stays."""
 
 PLAIN = CompressParams(
     mesh=MeshCodec(max_error_pixels=None, compression_level=0),

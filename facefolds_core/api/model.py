@@ -60,7 +60,7 @@ class Model:
         if isinstance(camera, str):
             camera = camera_named(camera, self.scene.cameras, "camera")
         poses = self.scene.poses
-        turn = None if poses is None else poses.at(number).rotation
+        turn = None if poses is None else poses.at(number)
         seen = camera if poses is None else poses.camera(camera, number)
         rgb, _, alpha = ModelView(self.manifolds, seen, turn).render(number)
         return picture(rgb, alpha, background)

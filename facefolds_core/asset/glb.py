@@ -15,7 +15,7 @@ import io
 import json
 import struct
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -99,6 +99,11 @@ def write_glb(path: Path, level: AssetLevel, name: str, frame: int = 0) -> None:
             expected=f"0 to {level.num_frames - 1}",
             found=frame,
             remedy="correct it in params.yaml",
+        )
+    if level.track is not None:
+        posed = (level.track.posed(one.vertices, frame).astype(np.float32) for one in level.layers)
+        level = replace(
+            level, layers=tuple(replace(one, vertices=v) for one, v in zip(level.layers, posed, strict=True))
         )
     textures = opaque_where_covered(level.frame(frame), level.windows)
     builder = Builder()

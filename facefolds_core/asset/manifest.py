@@ -29,7 +29,7 @@ from facefolds_core.asset.manifest_base import (
     StoredFile,
     Vector,
 )
-from facefolds_core.asset.manifest_extras import Audio, FilmedView, Photo, Poster, Stream
+from facefolds_core.asset.manifest_extras import Audio, FilmedView, Photo, Poster, StandingTorso, Stream
 from facefolds_core.geometry.similarity import Similarity
 
 FORMAT_VERSION, LEAST_VERSION = 4, 3
@@ -234,6 +234,7 @@ class Manifest(Part):
         audio: of the sequence.
         photos: for comparison.
         track_file: the meshes' motion as a whole, one pose a frame (`track_file.py`); absent where they stand still.
+        torso: what stays in the room while they move; absent where nothing does.
         view: the range that was filmed; absent where it is not known.
         manifest_sha256: of the manifest's own bytes with these 64 digits replaced by zeros.
     """
@@ -254,6 +255,7 @@ class Manifest(Part):
     poster: Poster | None = None
     photos: tuple[Photo, ...] = ()
     track_file: Maybe[StoredFile] = None
+    torso: Maybe[StandingTorso] = None
     view: Maybe[FilmedView] = None
     manifest_sha256: Sha256 = UNSEALED
 

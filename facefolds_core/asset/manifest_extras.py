@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import Annotated
 
 from pydantic import AfterValidator, Field
 
 from facefolds_core.asset.manifest_base import Count, Maybe, Offset, Part, Row, StoredFile, Vector
+from facefolds_core.geometry.torso import Torso
 
 
 class Picture(StoredFile):
@@ -97,6 +99,35 @@ class FilmedView(Directions):
     distance: Maybe[Annotated[tuple[Distance, Distance], AfterValidator(_rising)]] = None
     measured: Maybe[tuple[Vector, ...]] = None
     good: Maybe[Directions] = None
+
+
+class StandingTorso(Part):
+    """What stays in the room while the head turns: all that lies beyond a plane (`geometry/torso.py`).
+
+    In frame k a vertex x of the meshes is in the world at (1 - s) M_k x + s M x. There s = (normal.x - offset) / band,
+    from 0 to 1, M_k is the frame's pose in `track_file`, and M that of `quaternion` and `translation`.
+
+    Attributes:
+        normal: of unit length, from the head to the torso, in the axes of the meshes.
+        offset: where vertices begin to stay, units.
+        band: within which they come to stay, units.
+        quaternion: w, x, y, z.
+        translation: units.
+    """
+
+    normal: Vector
+    offset: float
+    band: Annotated[float, Field(gt=0)]
+    quaternion: tuple[float, float, float, float]
+    translation: Vector
+
+    @classmethod
+    def of(cls, torso: Torso) -> StandingTorso:
+        return cls(**asdict(torso))
+
+    def torso(self) -> Torso:
+        """As renderers take it."""
+        return Torso(self.normal, self.offset, self.band, self.quaternion, self.translation)
 
 
 class Stream(Part):

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import hashlib
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +24,8 @@ POSE_BYTES = 4 * NUMBERS
 
 FARTHEST = 1e3
 """Units that a head may be away."""
+LEAST_BAND = 1e-6
+"""Units."""
 
 
 def write_track(folder: Path, track: Track) -> StoredFile:
@@ -46,7 +49,8 @@ def read_track(folder: Path, manifest: Manifest) -> Track | None:
     problems = track_problems(manifest, data)
     if problems:
         raise UserError("damaged track", file=path, found="; ".join(problems), remedy=REMEDY)
-    return _unpacked(data)
+    torso = None if manifest.torso is None else manifest.torso.torso()
+    return replace(_unpacked(data), torso=torso)
 
 
 def track_problems(manifest: Manifest, data: bytes | None = None) -> list[str]:
@@ -56,6 +60,12 @@ def track_problems(manifest: Manifest, data: bytes | None = None) -> list[str]:
         data: of the track's file; without it only what the manifest says is looked at.
     """
     frames, entry = manifest.full.texture.frames, manifest.track_file
+    torso = manifest.torso
+    if torso is not None:
+        far = max(map(abs, (torso.offset, torso.band, *torso.translation)))
+        if entry is None or not torso.torso().sound or torso.band < LEAST_BAND or far > FARTHEST:
+            limits = f"a band of {LEAST_BAND:g} to {FARTHEST:g}"
+            return [f"a torso needs poses, a normal and a quaternion of unit length, {limits}"]
     if entry is not None and entry.bytes != POSE_BYTES * frames:
         return [f"{entry.bytes} bytes are no poses of {POSE_BYTES} for {frames} frames"]
     if data is None:

@@ -29,6 +29,7 @@ from facefolds_core.asset.manifest import (
     Video,
 )
 from facefolds_core.asset.manifest_base import StoredFile
+from facefolds_core.asset.manifest_extras import StandingTorso
 from facefolds_core.asset.packing import AtlasLayout, check_layout
 from facefolds_core.asset.parts import encode_parts
 from facefolds_core.asset.reader import read_level
@@ -86,7 +87,8 @@ def manifest_of(source: AssetSource, levels: Sequence[Level], folder: Path) -> M
     )
     if source.track is None:
         return manifest
-    return manifest.model_copy(update={"track_file": write_track(folder, source.track)})
+    torso = None if source.track.torso is None else StandingTorso.of(source.track.torso)
+    return manifest.model_copy(update={"track_file": write_track(folder, source.track), "torso": torso})
 
 
 @dataclass(frozen=True)

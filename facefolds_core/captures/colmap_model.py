@@ -19,7 +19,7 @@ from facefolds_core.captures.gathering import Calibration
 from facefolds_core.errors import UserError
 from facefolds_core.files.reading import is_regular, read_bytes, read_text
 from facefolds_core.geometry.cameras import HUGE
-from facefolds_core.geometry.track import rotation
+from facefolds_core.geometry.quaternions import rotation
 
 Array = NDArray[np.float64]
 

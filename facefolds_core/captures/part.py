@@ -40,6 +40,6 @@ def part_of(scene: Scene, frames: Sequence[int]) -> ScenePart:
         **{one.name: getattr(scene, one.name) for one in fields(Scene)},
         "frame_ids": tuple(scene.frame_ids[k] for k in chosen),
         "times": scene.times[chosen],
-        "poses": None if poses is None else Track(poses.quaternions[chosen], poses.translations[chosen]),
+        "poses": None if poses is None else Track(poses.quaternions[chosen], poses.translations[chosen], poses.torso),
     }
     return ScenePart(**values, whole=scene, chosen=tuple(chosen))

@@ -21,7 +21,7 @@ pose; without `poses` it is the world itself.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -36,6 +36,7 @@ from facefolds_core.files.reading import is_there, remake
 from facefolds_core.files.writing import read_json, write_json
 from facefolds_core.geometry.cameras import Camera, check_camera
 from facefolds_core.geometry.similarity import Similarity
+from facefolds_core.geometry.torso import Torso
 from facefolds_core.geometry.track import Track
 
 SCENE_VERSION = 3
@@ -115,10 +116,15 @@ class Scene:
         """Camera `index` as it stands in the head's own frame in frame `frame`: all rays at the subject are its."""
         return self.cameras[index] if self.poses is None else self.poses.camera(self.cameras[index], frame)
 
+    def with_torso(self, torso: Torso | None) -> Scene:
+        """With what stays in the room while the head turns, of a head that does."""
+        return self if self.poses is None else replace(self, poses=replace(self.poses, torso=torso))
+
     def views_of(self, split: Split, poses: int = 1) -> list[Camera]:
         """Cameras of one split in the head's own frame: of a still head the cameras, else each in `poses` frames.
 
         The frames are spread evenly, and differ from camera to camera, so that few cameras see the head in most poses.
+        Of a torso each sees once more how it was made.
         """
         indices, frames = self.indices(split), self.num_frames
         if self.poses is None:
@@ -129,7 +135,13 @@ class Scene:
             for position in range(len(indices))
             for part in range(count)
         ]
-        return [self.camera_in_head(i, k) for i, k in zip(np.repeat(indices, count), turns, strict=True)]
+        found, torso = (
+            [self.camera_in_head(i, k) for i, k in zip(np.repeat(indices, count), turns, strict=True)],
+            self.poses.torso,
+        )
+        return (
+            found if torso is None else [*found, *(self.cameras[i].transformed(torso.rest.inverse()) for i in indices)]
+        )
 
     def stored(self, path: Path) -> FrameStore | None:
         """The scene's frames of a frame store, or None where there is none."""

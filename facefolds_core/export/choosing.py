@@ -16,7 +16,7 @@ from facefolds_core.export.textures import resample
 from facefolds_core.facts import Fact, fact
 from facefolds_core.files.frame_store import FrameStore
 from facefolds_core.geometry.cameras import Camera
-from facefolds_core.geometry.meshes import TexturedMesh
+from facefolds_core.geometry.meshes import TexturedMesh, layers_at
 from facefolds_core.geometry.reflections import ReflectionMaps
 from facefolds_core.geometry.sphere_uv import Window
 from facefolds_core.rendering import Hits, composite
@@ -109,7 +109,7 @@ def _seen(
     images = {k: [textures.image(layer, k) for layer in layers] for k in {look.frame for look in looks}}
     found = []
     for look in looks:
-        hits, own = cast_layers(look.camera, meshes), images[look.frame]
+        hits, own = _cast(scene, look, meshes), images[look.frame]
         pixels = hits.choose(rng, RAYS)
         photo = look.photo.reshape(-1, 3)[pixels]
         if reflection is not None:
@@ -119,6 +119,10 @@ def _seen(
             photo = photo - shine.reshape(-1, 3)[pixels]
         found.append(Seen(look, pixels, hits.at(pixels), own, photo))
     return split, found
+
+
+def _cast(scene: Scene, look: Look, meshes: Sequence[TexturedMesh]) -> Hits:
+    return cast_layers(look.camera, layers_at(meshes, scene.poses, look.frame))
 
 
 Picture = tuple[NDArray[np.float32], NDArray[np.float32]]
@@ -204,10 +208,11 @@ def choose_meshes(
         ladder: of each candidate the meshes of all layers.
         grids, textures: as they were sampled.
     """
+    scene = scene.with_torso(grids.torso)
     split, seen = _seen(scene, ladder[max(MESHES)], _windows(grids), grids.reflection, textures)
 
     def pictures(candidate: int) -> list[Picture]:
-        return [composite(cast_layers(s.look.camera, ladder[candidate]).at(s.pixels), s.images) for s in seen]
+        return [composite(_cast(scene, s.look, ladder[candidate]).at(s.pixels), s.images) for s in seen]
 
     return _least("decimate.resolution", MESHES, pictures, split, seen)
 
@@ -221,6 +226,7 @@ def choose_texels(scene: Scene, meshes: Sequence[TexturedMesh], grids: Grids, te
     """
     tried = sorted({c for c in TEXELS if c < textures.height} | {textures.height})
     candidates = [c for c in tried if AtlasLayout.pack([(c, c)] * len(meshes)).fits()] or tried[:1]
+    scene = scene.with_torso(grids.torso)
     split, seen = _seen(scene, meshes, _windows(grids), grids.reflection, textures)
     images = {s.look.frame: s.images for s in seen}
 

@@ -72,7 +72,7 @@ def sample_model(
     r = samples_for(model, window) if params.resolution == "auto" else params.resolution
     grids = sample_grids(model, r, window)
     opacity = write_textures(folder / TEXTURES, model, grids)
-    return replace(grids, opacity=opacity, reflection=model.reflection_maps())
+    return replace(grids, opacity=opacity, reflection=model.reflection_maps(), torso=model.torso)
 
 
 @dataclass(frozen=True)

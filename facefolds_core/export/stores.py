@@ -1,6 +1,6 @@
 """The geometry files between the export stages: sampled grids, surfaces, textured meshes. All are npz archives.
 
-- `samples/grids.npz`: `GRIDS`, `CHART`, and of a model with a reflection `REFLECTION`;
+- `samples/grids.npz`: `GRIDS`, `CHART`, and of a model with a reflection or a torso `REFLECTION`, `TORSO`;
 - `surfaces/surfaces.npz`: of `grid` `SHEETS` and `CHART`; of `poisson` vertices_00, faces_00, ... one pair a layer;
 - `meshes/meshes.npz`: such pairs and st_00, layer-local texture coordinates.
 
@@ -25,6 +25,7 @@ from facefolds_core.geometry.chart import Belt, Chart
 from facefolds_core.geometry.meshes import Surface, TexturedMesh
 from facefolds_core.geometry.reflections import ReflectionMaps
 from facefolds_core.geometry.sphere_uv import Window
+from facefolds_core.geometry.torso import NUMBERS, Torso
 
 
 @dataclass(frozen=True)
@@ -39,6 +40,7 @@ class Grids:
         windows: (N, 4) float64, (u0, u1, v0, v1) of each layer's grid.
         chart: the model's.
         reflection: what the model adds by the direction, or None.
+        torso: what of the layers stays in the room while the head turns, or None.
     """
 
     points: NDArray[np.float32]
@@ -48,6 +50,7 @@ class Grids:
     windows: NDArray[np.float64]
     chart: Chart
     reflection: ReflectionMaps | None = None
+    torso: Torso | None = None
 
     @property
     def num_layers(self) -> int:
@@ -116,6 +119,7 @@ SHEETS: Kinds = {
     "window": (np.float64, (4,)),
 }
 CHART: Kinds = {"centre": (np.float64, (3,)), "belt": (np.float64, (2,))}
+TORSO: Kinds = {"torso": (np.float64, (NUMBERS,))}
 SURFACE: Kinds = {"vertices": (np.float32, ("V", 3)), "faces": (np.int32, ("F", 3))}
 TEXTURED: Kinds = {**SURFACE, "st": (np.float32, ("V", 2))}
 
@@ -124,6 +128,8 @@ def write_grids(path: Path, grids: Grids) -> None:
     arrays = {name: getattr(grids, name) for name in GRIDS} | _chart_arrays(grids.chart)
     if grids.reflection is not None:
         arrays |= {f"reflection_{name}": np.asarray(value) for name, value in vars(grids.reflection).items()}
+    if grids.torso is not None:
+        arrays["torso"] = grids.torso.numbers
     _write(path, arrays)
 
 
@@ -132,16 +138,17 @@ def read_grids(path: Path) -> Grids:
     arrays = _read(path)
     taken = _take(arrays, path, GRIDS)
     _check_windows(taken["windows"], path)
-    return Grids(**taken, chart=_take_chart(arrays, path), reflection=_take_reflection(arrays, path))
+    chart, reflection, torso = _take_chart(arrays, path), _take_reflection(arrays, path), _take_torso(arrays, path)
+    return Grids(**taken, chart=chart, reflection=reflection, torso=torso)
 
 
-def read_places(path: Path) -> tuple[list[Window], Chart, ReflectionMaps | None]:
-    """Only windows, chart and reflection in a file of `write_grids`; raises as `read_grids` does."""
-    arrays = _read(path, {"windows", *CHART, *REFLECTION})
+def read_places(path: Path) -> tuple[list[Window], Chart, ReflectionMaps | None, Torso | None]:
+    """Only windows, chart, reflection and torso in a file of `write_grids`; raises as `read_grids` does."""
+    arrays = _read(path, {"windows", *CHART, *REFLECTION, *TORSO})
     windows = _take(arrays, path, {"windows": GRIDS["windows"]})["windows"]
     _check_windows(windows, path)
     places = [(float(u0), float(u1), float(v0), float(v1)) for u0, u1, v0, v1 in windows]
-    return places, _take_chart(arrays, path), _take_reflection(arrays, path)
+    return places, _take_chart(arrays, path), _take_reflection(arrays, path), _take_torso(arrays, path)
 
 
 def _take_reflection(arrays: Arrays, path: Path) -> ReflectionMaps | None:
@@ -152,6 +159,15 @@ def _take_reflection(arrays: Arrays, path: Path) -> ReflectionMaps | None:
     _check_windows(window[None], path)
     u0, u1, v0, v1 = window.tolist()
     return ReflectionMaps((u0, u1, v0, v1), **taken)
+
+
+def _take_torso(arrays: Arrays, path: Path) -> Torso | None:
+    if "torso" not in arrays:
+        return None
+    torso = Torso.of(_take(arrays, path, TORSO)["torso"])
+    if not torso.sound:
+        raise _damaged(path, "torso", "a normal and a quaternion of unit length, a band above 0", str(torso))
+    return torso
 
 
 def _chart_arrays(chart: Chart) -> Arrays:

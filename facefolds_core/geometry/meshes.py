@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
+
+from facefolds_core.geometry.track import Track
 
 
 @dataclass(frozen=True)
@@ -45,3 +48,21 @@ class TexturedMesh(Surface):
         image = None if texture is None else Image.fromarray(texture)
         visual: Any = trimesh.visual.TextureVisuals(uv=uv, image=image)  # type: ignore[no-untyped-call]
         return trimesh.Trimesh(self.vertices, self.faces, visual=visual, process=False)
+
+
+class Mesh(Protocol):
+    """One layer: vertices (V, 3) float32, faces (F, 3) int32, st (V, 2) float32."""
+
+    @property
+    def vertices(self) -> NDArray[np.float32]: ...
+    @property
+    def faces(self) -> NDArray[np.int32]: ...
+    @property
+    def st(self) -> NDArray[np.float32]: ...
+
+
+def layers_at(layers: Sequence[Mesh], track: Track | None, frame: float) -> Sequence[Mesh]:
+    """Layers in a frame, in their own axes: a torso stays in the room while the head turns."""
+    if track is None or track.torso is None:
+        return layers
+    return [TexturedMesh(track.posed(one.vertices, frame).astype(np.float32), one.faces, one.st) for one in layers]

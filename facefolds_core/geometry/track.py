@@ -9,7 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from facefolds_core.geometry.cameras import Camera
+from facefolds_core.geometry.quaternions import quaternion, rotation
 from facefolds_core.geometry.similarity import Similarity
+from facefolds_core.geometry.torso import Torso
 
 Array = NDArray[np.float64]
 
@@ -24,10 +26,12 @@ class Track:
     Attributes:
         quaternions: (K, 4) w, x, y, z of R, of unit length; neighbours are less than half a turn apart (q or -q).
         translations: (K, 3) t.
+        torso: what stays in the room; None where all moves with the head, or as long as that is not known.
     """
 
     quaternions: Array
     translations: Array
+    torso: Torso | None = None
 
     @classmethod
     def of(cls, rotations: ArrayLike, translations: ArrayLike) -> Track:
@@ -54,6 +58,10 @@ class Track:
         """A camera of the world as it stands in the head's frame at a time."""
         return camera.transformed(self.at(time).inverse())
 
+    def posed(self, points: NDArray[np.floating], time: float) -> Array:
+        """(..., 3) where points of the layers, as these were made, are at a time, in the head's own frame."""
+        return points.astype(np.float64) if self.torso is None else self.torso.posed(points, self.at(time))
+
     def degrees(self) -> Array:
         """(K,) of the turn in each frame."""
         cosine = np.clip(np.abs(self.quaternions[:, 0]), 0, 1)
@@ -71,33 +79,6 @@ class Track:
             return ["numbers that are not finite"]
         off = np.abs(np.linalg.norm(self.quaternions, axis=1) - 1)
         return [f"quaternion {int(off.argmax())} is not of unit length"] if off.max() > UNIT else []
-
-
-def quaternion(R: Array) -> Array:
-    """(4,) w, x, y, z with w >= 0 of a rotation (3, 3): the largest eigenvector of Bar-Itzhack's matrix (2000)."""
-    (a, b, c), (d, e, f), (g, h, i) = np.asarray(R, float)
-    symmetric = np.array(
-        [
-            [a + e + i, h - f, c - g, d - b],
-            [h - f, a - e - i, b + d, c + g],
-            [c - g, b + d, e - a - i, f + h],
-            [d - b, c + g, f + h, i - a - e],
-        ]
-    )
-    q: Array = np.linalg.eigh(symmetric)[1][:, -1]
-    return q if q[0] >= 0 else -q
-
-
-def rotation(q: Array) -> Array:
-    """(3, 3) of a unit quaternion w, x, y, z."""
-    w, x, y, z = q
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-        ]
-    )
 
 
 def slerp(first: Array, second: Array, share: float) -> Array:

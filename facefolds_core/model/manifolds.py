@@ -10,7 +10,9 @@ from torch import Tensor, nn
 from torch.nn.functional import silu
 
 from facefolds_core.geometry.chart import Chart
+from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.geometry.sphere_uv import FULL_WINDOW, Window, uv_to_directions
+from facefolds_core.geometry.torso import Torso
 from facefolds_core.model.intersection import Crossings, first_crossings
 from facefolds_core.model.layers import LinearStack
 
@@ -35,6 +37,11 @@ class Manifolds(Protocol):
         ...
 
     @property
+    def torso(self) -> Torso | None:
+        """What stays in the room while the head turns."""
+        ...
+
+    @property
     def window(self) -> Window:
         """(u0, u1, v0, v1) beyond which there are no surfaces."""
         ...
@@ -44,8 +51,12 @@ class Manifolds(Protocol):
         """Radius of the ball around c that encloses all layers."""
         ...
 
-    def crossings(self, origins: Tensor, directions: Tensor) -> Crossings:
-        """Rays [R, 3] -> nearest crossing with each layer, outermost first; differentiable."""
+    def crossings(self, origins: Tensor, directions: Tensor, pose: Similarity | None = None) -> Crossings:
+        """Rays [R, 3] -> nearest crossing with each layer, outermost first; differentiable without a pose.
+
+        Args:
+            pose: of the head, which turns over a torso (head -> world); points are those of the layers as made.
+        """
         ...
 
     def radii_at(self, uv: Tensor) -> tuple[Tensor, Tensor]:
@@ -91,7 +102,7 @@ class MlpManifolds(nn.Module):
     ) -> None:
         super().__init__()
         x, y, z = centre
-        self.chart, self.window = Chart((x, y, z)), FULL_WINDOW
+        self.chart, self.window, self.torso = Chart((x, y, z)), FULL_WINDOW, None
         self.register_buffer("centre", torch.tensor(centre, dtype=torch.float32))
         self.register_buffer("levels", torch.tensor(levels, dtype=torch.float32))
         self.radius = radius
@@ -112,7 +123,7 @@ class MlpManifolds(nn.Module):
     def num_layers(self) -> int:
         return len(self.levels)
 
-    def crossings(self, origins: Tensor, directions: Tensor) -> Crossings:
+    def crossings(self, origins: Tensor, directions: Tensor, pose: Similarity | None = None) -> Crossings:
         return first_crossings(self, self.levels, origins, directions, self.centre, self.radius, self.samples)
 
     def radii_at(self, uv: Tensor) -> tuple[Tensor, Tensor]:

@@ -11,9 +11,11 @@ import torch
 from torch import Tensor, nn
 
 from facefolds_core.geometry.chart import Chart
+from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.geometry.sphere_uv import Window
+from facefolds_core.geometry.torso import Torso
 from facefolds_core.model.intersection import Crossings, search_interval
-from facefolds_core.model.radial_kernel import bounds, crossing_distances, heights
+from facefolds_core.model.radial_kernel import bounds, crossing_distances, heights, placed_points
 
 MIN_SLOPE = 0.1
 """|d(r - rho) / d distance| is bounded below by this in gradients, as in `intersection`."""
@@ -40,6 +42,7 @@ class RadialManifolds(nn.Module):
         halfwidth: [rows, columns], positive, units.
         num_layers: of these.
         second: [rows, columns, M] radii of layers beneath them, outermost first, 0 where they have no surface.
+        torso: what of them stays in the room while the head turns.
     """
 
     centre: Tensor
@@ -53,9 +56,10 @@ class RadialManifolds(nn.Module):
         halfwidth: Tensor,
         num_layers: int,
         second: Tensor | None = None,
+        torso: Torso | None = None,
     ) -> None:
         super().__init__()
-        self.chart = chart
+        self.chart, self.torso = chart, torso
         self.register_buffer("centre", torch.tensor(chart.centre, dtype=torch.float32))
         self.window = window
         self.num_layers = num_layers + (0 if second is None else second.shape[-1])
@@ -88,8 +92,11 @@ class RadialManifolds(nn.Module):
     def regularisation(self) -> Tensor:
         return self.middle.new_zeros(())
 
-    def crossings(self, origins: Tensor, directions: Tensor) -> Crossings:
+    def crossings(self, origins: Tensor, directions: Tensor, pose: Similarity | None = None) -> Crossings:
         """Nearest crossing with each layer. The compiled search where no gradient is asked for on a CPU."""
+        bend = self.bend(pose)
+        if bend is not None:
+            return self._turned(origins, directions, bend)
         if torch.is_grad_enabled() or origins.device.type != "cpu":
             return self.reference_crossings(origins, directions)
         offsets = (origins - self.centre).double().numpy()
@@ -97,12 +104,33 @@ class RadialManifolds(nn.Module):
         points = origins[:, None] + distance[..., None] * directions[:, None]
         return Crossings(points, distance, distance > 0)
 
+    def _turned(self, origins: Tensor, directions: Tensor, bend: np.ndarray) -> Crossings:
+        """`crossings` while a torso stays in the room; points are those of the layers as they were made."""
+        o, d = (part.cpu().double().numpy() for part in (origins, directions))
+        offsets = o - self.centre.cpu().double().numpy()
+        distance = self.tracer()(offsets, d, bend)
+        there = offsets[:, None] + distance[..., None] * d[:, None]
+        points = placed_points(there.reshape(-1, 3), bend).reshape(there.shape)
+        found = torch.from_numpy(distance).to(origins)
+        return Crossings(torch.from_numpy(points).to(origins) + self.centre, found, found > 0)
+
+    def bend(self, pose: Similarity | None) -> np.ndarray | None:
+        """How the compiled search finds the layers where the head stands in a pose (head -> world): (BEND,), or None
+        without a torso."""
+        if self.torso is None or pose is None:
+            return None
+        centre, normal, shift = self.centre.cpu().double().numpy(), np.array(self.torso.normal), self.torso.shift(pose)
+        moved = shift.apply(centre) - centre
+        farthest = float(np.linalg.norm(moved)) + self.radius * float(np.linalg.norm(shift.rotation - np.eye(3), 2))
+        offset = self.torso.offset - normal @ centre
+        return np.array([*normal, offset, self.torso.band, *shift.rotation.ravel(), *moved, farthest])
+
     def compiled_distances(self, offsets: np.ndarray, directions: np.ndarray) -> np.ndarray:
         """(R, 3) float64 origins minus c, and directions -> (R, N) float32 distances, 0 where missed."""
-        return self.tracer()(offsets, directions)
+        return self.tracer()(offsets, directions, None)
 
-    def tracer(self) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
-        """`compiled_distances` with the surfaces as they are now, prepared for many calls."""
+    def tracer(self) -> Callable[[np.ndarray, np.ndarray, np.ndarray | None], np.ndarray]:
+        """`compiled_distances` with the surfaces as they are now, prepared for many calls; last comes a `bend`."""
         rho = self.radii().detach().cpu().numpy()
         window, belt, bound = np.array(self.window), self.chart.numbers, self.radius
         if self._prepared is None or not np.array_equal(self._prepared[0], rho, equal_nan=True):
@@ -110,10 +138,10 @@ class RadialManifolds(nn.Module):
         _, cells, high = self._prepared
         whole = int(np.isfinite(rho).all((0, 1)).sum())
 
-        def distances(offsets: np.ndarray, directions: np.ndarray) -> np.ndarray:
+        def distances(offsets: np.ndarray, directions: np.ndarray, bend: np.ndarray | None) -> np.ndarray:
             offsets, directions = np.ascontiguousarray(offsets), np.ascontiguousarray(directions)
             found: np.ndarray = crossing_distances(
-                offsets, directions, rho, window, belt, cells, high, whole, bound, STEP
+                offsets, directions, rho, window, belt, cells, high, whole, bound, STEP, bend
             )
             return found
 

@@ -40,6 +40,64 @@ def _look_up(rho, row, column, layer):  # type: ignore[no-untyped-def]
     return top * (1 - a) + bottom * a
 
 
+BEND = 18
+"""Numbers of a bend (`turned.bend_of`): n, d and w of a torso, R by rows and t of its shift D, all about c, and how far
+anything goes."""
+TRIES, EXACT = 8, 1e-6
+"""Regula falsi's steps for the share of a point in a torso's band, and from which error on it is exact."""
+
+
+@compiled
+def placed(x: Any, y: Any, z: Any, bend: Any) -> Any:
+    """Where a point, relative to c, is on the layers as they were made: the inverse of `Torso.posed`."""
+    if bend is None:
+        return x, y, z
+    low = _share(x, y, z, bend)
+    if low <= 0.0:
+        return x, y, z
+    hx, hy, hz = _straightened(x, y, z, 1.0, bend)
+    high = _share(hx, hy, hz, bend) - 1.0
+    if high >= 0.0:
+        return hx, hy, hz
+    a, b, ga, gb = 0.0, 1.0, low, high
+    for _ in range(TRIES):
+        share = a + (b - a) * (ga / (ga - gb))
+        hx, hy, hz = _straightened(x, y, z, share, bend)
+        off = _share(hx, hy, hz, bend) - share
+        if abs(off) < EXACT:
+            break
+        if off > 0.0:
+            a, ga = share, off
+            gb *= 0.5  # Illinois: the stale end counts half
+        else:
+            b, gb = share, off
+            ga *= 0.5
+    return hx, hy, hz
+
+
+@compiled
+def _share(x: Any, y: Any, z: Any, bend: Any) -> Any:
+    """s, from below 0 to above 1."""
+    return (bend[0] * x + bend[1] * y + bend[2] * z - bend[3]) / bend[4]
+
+
+@compiled
+def _straightened(x: Any, y: Any, z: Any, share: Any, bend: Any) -> Any:
+    """The point that a share of D brings there: ((1 - s) I + s R)^-1 (p - s t), by Cramer's rule."""
+    rest = 1.0 - share
+    a, b, c = rest + share * bend[5], share * bend[6], share * bend[7]
+    d, e, f = share * bend[8], rest + share * bend[9], share * bend[10]
+    g, h, i = share * bend[11], share * bend[12], rest + share * bend[13]
+    x, y, z = x - share * bend[14], y - share * bend[15], z - share * bend[16]
+    u, v, w = e * i - f * h, f * g - d * i, d * h - e * g
+    scale = 1.0 / (a * u + b * v + c * w)
+    return (
+        scale * (u * x + (c * h - b * i) * y + (b * f - c * e) * z),
+        scale * (v * x + (a * i - c * g) * y + (c * d - a * f) * z),
+        scale * (w * x + (b * g - a * h) * y + (a * e - b * d) * z),
+    )
+
+
 SKIP = 0.02
 """Length of a stride through empty space, units: a multiple of `radial.STEP`, so that samples stay where they were."""
 
@@ -142,6 +200,7 @@ def crossing_distances(
     whole: int,  # layers that have no holes; they come first
     bound: float,
     step: float,
+    bend: Array | None,  # (BEND,), or None where all layers are as they were made
 ) -> Array:
     """(R, N) float32: distance of the nearest crossing with each layer; 0 where there is none.
 
@@ -151,7 +210,7 @@ def crossing_distances(
     """
     result = np.zeros((offsets.shape[0], rho.shape[2]), np.float32)
     for ray in prange(offsets.shape[0]):
-        cross(ray, offsets, directions, rho, window, belt, cells, heights, whole, bound, step, result)
+        cross(ray, offsets, directions, rho, window, belt, cells, heights, whole, bound, step, bend, result)
     return result
 
 
@@ -168,6 +227,7 @@ def cross(
     whole: Any,
     bound: Any,
     step: Any,
+    bend: Any,
     result: Any,
 ) -> None:
     """`crossing_distances` of one ray, into result, which is 0."""
@@ -175,16 +235,21 @@ def cross(
     ox, oy, oz = offsets[ray, 0], offsets[ray, 1], offsets[ray, 2]
     dx, dy, dz = directions[ray, 0], directions[ray, 1], directions[ray, 2]
     along = ox * dx + oy * dy + oz * dz
+    skip = SKIP
+    if bend is not None:
+        bound += bend[17]
+        skip = 0.5 * SKIP  # what is bent may be drawn together to half its length
     disc = along * along - (ox * ox + oy * oy + oz * oz - bound * bound)
     if disc <= 0.0:
         return
     half = math.sqrt(disc)
     near, far = max(-along - half, 0.0), -along + half
-    if window[2] >= -1.0 and window[3] <= 1.0:  # nothing behind c
-        if dx > 0.0:
-            near = max(near, -ox / dx)
-        elif dx < 0.0:
-            far = min(far, -ox / dx)
+    if bend is None:  # noqa: SIM102  numba leaves out what hangs on this alone
+        if window[2] >= -1.0 and window[3] <= 1.0:
+            if dx > 0.0:
+                near = max(near, -ox / dx)
+            elif dx < 0.0:
+                far = min(far, -ox / dx)
     if far <= near:
         return
     found, found_whole = 0, 0
@@ -195,14 +260,14 @@ def cross(
     radius_before = 0.0
     s = near
     while True:
-        x, y, z = ox + s * dx, oy + s * dy, oz + s * dz
+        x, y, z = placed(ox + s * dx, oy + s * dy, oz + s * dz, bend)
         u, v, r = chart_position(x, y, z, belt)
         ci, cj = _cell(2.0 - u), _cell(v + 2.0)
         if r > heights[int(found_whole == whole), ci, cj]:
             last = -1.0
             if s >= far:
                 break
-            s = min(s + SKIP, far)
+            s = min(s + skip, far)
             continue
         row, column = _grid_position(u, v, window, rows, columns)
         if row < 0.0 or column < 0.0 or row > rows - 1 or column > columns - 1:
@@ -214,7 +279,7 @@ def cross(
             if last >= 0.0 and (now != state or now == 3):
                 # Grid position along the bracket: a parabola through its ends and its middle.
                 t = 0.5 * (last + s)
-                mx, my, mz = ox + t * dx, oy + t * dy, oz + t * dz
+                mx, my, mz = placed(ox + t * dx, oy + t * dy, oz + t * dz, bend)
                 mid_u, mid_v, _ = chart_position(mx, my, mz, belt)
                 mid_row, mid_column = _grid_position(mid_u, mid_v, window, rows, columns)
                 bend_row = 2.0 * (row_before + row) - 4.0 * mid_row
@@ -232,7 +297,7 @@ def cross(
                         for _ in range(8):
                             f = fa + (fb - fa) * (ga / (ga - gb))
                             d = last + f * (s - last)
-                            x, y, z = ox + d * dx, oy + d * dy, oz + d * dz
+                            x, y, z = placed(ox + d * dx, oy + d * dy, oz + d * dz, bend)
                             at_row = row_before + f * (row - row_before + bend_row * (f - 1.0))
                             at_column = column_before + f * (column - column_before + bend_column * (f - 1.0))
                             at_radius = chart_radius(x, y, z, belt)
@@ -265,25 +330,40 @@ def texture_positions(
     distance: Array,  # (R, N) float32, 0 where missed
     window: Array,  # (4,)
     belt: Array,  # (4,)
+    bend: Array | None,  # of `crossing_distances`
 ) -> Array:
     """(R, N, 2) uint16: s and t of the crossings over the window, as `hit_codes` has them."""
     codes = np.zeros((distance.shape[0], distance.shape[1], 2), np.uint16)
     for ray in prange(distance.shape[0]):
-        encode(ray, offsets, directions, distance, window, belt, codes)
+        encode(ray, offsets, directions, distance, window, belt, bend, codes)
     return codes
 
 
 @compiled
-def encode(ray: Any, offsets: Any, directions: Any, distance: Any, window: Any, belt: Any, codes: Any) -> None:
+def encode(
+    ray: Any, offsets: Any, directions: Any, distance: Any, window: Any, belt: Any, bend: Any, codes: Any
+) -> None:
     """`texture_positions` of one ray, into codes, which are 0."""
     for n in range(distance.shape[1]):
         d = distance[ray, n]
         if d == 0.0:
             continue
-        x = offsets[ray, 0] + d * directions[ray, 0]
-        y = offsets[ray, 1] + d * directions[ray, 1]
-        z = offsets[ray, 2] + d * directions[ray, 2]
+        x, y, z = placed(
+            offsets[ray, 0] + d * directions[ray, 0],
+            offsets[ray, 1] + d * directions[ray, 1],
+            offsets[ray, 2] + d * directions[ray, 2],
+            bend,
+        )
         u, v, _ = chart_position(x, y, z, belt)
         row, column = _grid_position(u, v, window, 2, 2)
         codes[ray, n, 0] = int(1.5 + SCALE * min(max(column, 0.0), 1.0))
         codes[ray, n, 1] = int(1.5 + SCALE * min(max(row, 0.0), 1.0))
+
+
+@kernel(parallel=True)
+def placed_points(points: Array, bend: Array) -> Array:
+    """(P, 3) float64: where points (P, 3), relative to c, are on the layers as they were made; see `placed`."""
+    found = np.empty(points.shape)
+    for k in prange(points.shape[0]):
+        found[k, 0], found[k, 1], found[k, 2] = placed(points[k, 0], points[k, 1], points[k, 2], bend)
+    return found

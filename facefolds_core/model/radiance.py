@@ -9,7 +9,9 @@ from torch import Tensor, nn
 
 from facefolds_core.geometry.chart import Chart
 from facefolds_core.geometry.reflections import ReflectionMaps
+from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.geometry.sphere_uv import Window
+from facefolds_core.geometry.torso import Torso
 from facefolds_core.model.compositing import compositing_weights
 from facefolds_core.model.intersection import Crossings
 from facefolds_core.model.manifolds import Manifolds
@@ -84,6 +86,11 @@ class RadianceManifolds(nn.Module):
         return self.manifolds.chart
 
     @property
+    def torso(self) -> Torso | None:
+        """What stays in the room while the head turns."""
+        return self.manifolds.torso
+
+    @property
     def window(self) -> Window:
         """(u0, u1, v0, v1) beyond which there are no surfaces."""
         return self.manifolds.window
@@ -116,13 +123,14 @@ class RadianceManifolds(nn.Module):
         return Traced((weights[..., None] * colours).sum(1), weights, shaded.view)
 
     @torch.no_grad()
-    def crossings(self, origins: Tensor, directions: Tensor) -> Crossings:
+    def crossings(self, origins: Tensor, directions: Tensor, pose: Similarity | None = None) -> Crossings:
         """Nearest crossing of each ray with each layer, outermost first.
 
         Args:
             origins, directions: [R, 3], directions of unit length.
+            pose: of the head, which turns over a torso; points are those of the layers as they were made.
         """
-        parts = [self.manifolds.crossings(o, d) for o, d in _chunks(origins, directions)]
+        parts = [self.manifolds.crossings(o, d, pose) for o, d in _chunks(origins, directions)]
         return Crossings(
             torch.cat([p.points for p in parts]),
             torch.cat([p.distance for p in parts]),

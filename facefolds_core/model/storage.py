@@ -14,6 +14,7 @@ from facefolds_core.errors import UserError
 from facefolds_core.files.reading import check_regular
 from facefolds_core.files.writing import read_json, write_json
 from facefolds_core.geometry.chart import Belt, Chart
+from facefolds_core.geometry.torso import Torso
 from facefolds_core.model.grids import GridTextures
 from facefolds_core.model.manifolds import MlpManifolds
 from facefolds_core.model.radial import RadialManifolds
@@ -74,12 +75,19 @@ def _sound_belt(belt: Belt | None) -> Belt | None:
     return belt
 
 
+def _sound_torso(torso: Torso | None) -> Torso | None:
+    if torso is not None and not torso.sound:
+        raise ValueError("a torso whose numbers are finite, its normal and quaternion of unit length")
+    return torso
+
+
 class ExplicitSpec(BaseModel):
     """The same for the explicit model (`radial`, `grids`).
 
     Attributes:
         centre: c, units.
         belt: of the chart; absent where there is none.
+        torso: what stays in the room while the head turns; absent where nothing does.
         window: (u0, u1, v0, v1).
         nodes: rows and columns of the radius maps.
         texels: H and W of the textures.
@@ -97,6 +105,7 @@ class ExplicitSpec(BaseModel):
     kind: Literal["explicit"] = "explicit"
     centre: tuple[float, float, float]
     belt: Annotated[Belt | None, AfterValidator(_sound_belt), Field(exclude_if=lambda belt: belt is None)] = None
+    torso: Annotated[Torso | None, AfterValidator(_sound_torso), Field(exclude_if=lambda torso: torso is None)] = None
     window: tuple[float, float, float, float]
     nodes: tuple[Count, Count]
     texels: tuple[Count, Count]
@@ -144,7 +153,7 @@ def build_explicit(spec: ExplicitSpec) -> RadianceManifolds:
         textures = SegmentedTextures(spec.window, spec.texels, spec.num_layers, spec.segments, reflection)
     second = torch.ones(*spec.nodes, spec.second_layers) if spec.second_layers else None
     first = spec.num_layers - spec.second_layers
-    manifolds = RadialManifolds(Chart(spec.centre, spec.belt), spec.window, blank, blank, first, second)
+    manifolds = RadialManifolds(Chart(spec.centre, spec.belt), spec.window, blank, blank, first, second, spec.torso)
     return RadianceManifolds(manifolds, textures)
 
 

@@ -20,7 +20,7 @@ from facefolds_core.asset.reader import AssetLevel
 from facefolds_core.geometry.track import Track
 from facefolds_core.rendering.camera_paths import Eye, camera_of
 from facefolds_core.rendering.raster import cast_layers
-from facefolds_core.rendering.reference import Layered, composite, seen_from
+from facefolds_core.rendering.reference import Layered, composite, layers_in, seen_from
 from facefolds_core.spacing import spread
 
 SIDE = 200
@@ -69,7 +69,7 @@ class Model:
         centre, radius = (self.low + self.high) / 2, float(np.linalg.norm(self.high - self.low)) / 2
         eye = Eye(azimuth, elevation, AWAY * radius, tuple(centre.tolist()))
         camera = camera_of(eye, SIDE, SIDE, FIELD_OF_VIEW)
-        hits = {k: cast_layers(seen_from(self.level, camera, k), self.level.layers) for k in self.poses}
+        hits = {k: cast_layers(seen_from(self.level, camera, k), layers_in(self.level, k)) for k in self.poses}
         return max(worst_veil(composite(hits[k], textures)[1]) for k, textures in self.poses.items())
 
 

@@ -12,10 +12,12 @@ from facefolds_core.params import BakeParams
 
 
 def bake(folders: SubjectFolders) -> str:
+    grids = read_grids(folders.samples / "grids.npz")
+    scene = read_scene(folders.scene).with_torso(grids.torso)
     with atomic_folder(folders.textures) as temporary:
         rays = steps.bake(
-            read_scene(folders.scene).views_of("train", steps.BAKED_VIEWS),
-            read_grids(folders.samples / "grids.npz"),
+            scene.views_of("train", steps.BAKED_VIEWS),
+            grids,
             read_meshes(folders.meshes / "meshes.npz"),
             folders.resampled / steps.TEXTURES,
             read_stage(BakeParams, folders.config),

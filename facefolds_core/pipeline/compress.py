@@ -21,8 +21,8 @@ from facefolds_core.params import CompressParams
 
 def compress(folders: SubjectFolders) -> str:
     params = read_stage(CompressParams, folders.config)
-    scene = read_scene(folders.scene)
-    windows, chart, reflection = read_places(folders.samples / "grids.npz")
+    windows, chart, reflection, torso = read_places(folders.samples / "grids.npz")
+    scene = read_scene(folders.scene).with_torso(torso)
     export = Export(
         meshes=read_meshes(folders.meshes / "meshes.npz"),
         windows=windows,

@@ -16,7 +16,7 @@ from facefolds_core.params import SampleParams
 def sample(folders: SubjectFolders) -> str:
     params = read_stage(SampleParams, folders.config)
     model = load_model(folders.model, device_of(read_train(folders.config)))
-    scene = read_scene(folders.scene)
+    scene = read_scene(folders.scene).with_torso(model.torso)
     check_frames(model, scene, folders.model)
     with atomic_folder(folders.samples) as temporary:
         cameras = scene.views_of("train", SAMPLED_VIEWS)

@@ -19,7 +19,7 @@ from facefolds_core.geometry.cameras import Camera
 from facefolds_core.kernels.jit import compiled, kernel
 from facefolds_core.rendering.pixels import SIDE, Image, Lit, finer, lit_hits, pixel_means, strips_of
 from facefolds_core.rendering.raster import cast_layers
-from facefolds_core.rendering.reference import BLACK, Hits, Layered, seen_from
+from facefolds_core.rendering.reference import BLACK, Hits, Layered, layers_in, seen_from
 
 
 @dataclass(frozen=True)
@@ -99,7 +99,8 @@ class AreaView:
 
 def view_of(asset: Layered, camera: Camera, frame: float = 0) -> AreaView:
     """What a camera of the world sees of an asset's full level in `frame`, with its track and its reflection."""
-    hits = lit_hits(asset, frame, lambda part: cast_layers(part, asset.layers))
+    layers = layers_in(asset, frame)
+    hits = lit_hits(asset, frame, lambda part: cast_layers(part, layers))
     return AreaView.of_hits(seen_from(asset, camera, frame), hits)
 
 

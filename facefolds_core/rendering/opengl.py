@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from facefolds_core.errors import UserError
 from facefolds_core.geometry.cameras import Camera
+from facefolds_core.geometry.track import Track
 from facefolds_core.rendering.opengl_reflection import FRAGMENT_WITH_REFLECTION, Glossy, upload
 from facefolds_core.rendering.reference import BLACK, Image, Layered, room_from, seen_from
 
@@ -24,6 +25,9 @@ VERTEX = """
 #version 330
 uniform mat4 projection; // clip coordinates of a world point
 uniform vec2 slice; // of the depth range [-1, 1]: half its size, its middle
+uniform vec4 torso; // normal and offset of the plane from which on points stay in the room while the head turns
+uniform float band; // within which they come to stay; 0: nothing does
+uniform mat4 stay; // where these are, in the layers' own axes
 in vec3 position;
 in vec2 corner_st;
 out vec2 st;
@@ -32,7 +36,11 @@ invariant gl_Position; // the same depth in both passes
 void main() {
   st = corner_st;
   point = position;
-  gl_Position = projection * vec4(position, 1.0);
+  if (band > 0.0) {
+    float share = clamp((dot(torso.xyz, position) - torso.w) / band, 0.0, 1.0);
+    point = mix(position, (stay * vec4(position, 1.0)).xyz, share);
+  }
+  gl_Position = projection * vec4(point, 1.0);
   gl_Position.z = slice.x * gl_Position.z + slice.y * gl_Position.w;
 }
 """
@@ -108,9 +116,12 @@ class OpenGLRenderer:
         target = self._sized_target(camera)
         _write(target, colour=True, depth=True)
         target.clear(0.0, 0.0, 0.0, 0.0, depth=1.0)
-        projection = _projection(camera, self._vertices).T.astype("f4").tobytes()
+        track: Track | None = getattr(self._asset, "track", None)
+        points = self._vertices if track is None else track.posed(self._vertices, frame)
+        projection = _projection(camera, points).T.astype("f4").tobytes()
         for program in (self._depth, self._colour):
             _uniform(program, "projection").write(projection)
+            self._set_torso(program, frame)
         for unit, (name, texture) in enumerate(self._reflections, 1):
             _uniform(self._colour, name).value = unit
             texture.use(unit)
@@ -131,6 +142,17 @@ class OpenGLRenderer:
         alpha = np.clip(rgba[..., 3], 0, 1)
         rgb = rgba[..., :3] + (1 - alpha)[..., None] * np.asarray(background, np.float32)
         return np.asarray(rgb, np.float32), alpha
+
+    def _set_torso(self, program: moderngl.Program, frame: int) -> None:
+        track: Track | None = getattr(self._asset, "track", None)
+        torso = None if track is None else track.torso
+        _uniform(program, "band").value = 0.0 if torso is None else torso.band
+        if track is None or torso is None:
+            return
+        stay, shift = np.eye(4), torso.shift(track.at(frame))
+        stay[:3, :3], stay[:3, 3] = shift.rotation, shift.translation
+        _uniform(program, "torso").write(np.array([*torso.normal, torso.offset], "f4").tobytes())
+        _uniform(program, "stay").write(stay.T.astype("f4").tobytes())
 
     def _draw_layer(
         self,

@@ -83,7 +83,7 @@ def render(asset: Layered, camera: Camera, frame: int, background: ArrayLike = B
     Returns:
         rgb (H, W, 3) and alpha (H, W), float32 in [0, 1].
     """
-    look, textures = lit_hits(asset, frame, AssetCaster(asset).cast), asset.frame(frame)
+    look, textures = lit_hits(asset, frame, AssetCaster(asset, frame).cast), asset.frame(frame)
     parts = []
     for _, strip in strips_of(seen_from(asset, camera, frame)):
         hits, added = look(strip)

@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facefolds_core.geometry.cameras import Camera
+from facefolds_core.geometry.meshes import Mesh
 from facefolds_core.kernels.jit import kernel
-from facefolds_core.rendering.reference import Hits, Mesh
+from facefolds_core.rendering.reference import Hits
 
 EDGE = 1e-9
 """A ray that passes an edge by less than this share of the triangle hits: none slips between two triangles."""

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from facefolds_core.geometry.cameras import Camera
+from facefolds_core.geometry.meshes import Mesh, layers_at
 from facefolds_core.geometry.rays import MISS, EmbreeMesh
 from facefolds_core.geometry.track import Track
 from facefolds_core.rendering.compositing import FrontToBack
@@ -26,17 +27,6 @@ Texture = NDArray[np.uint8]
 """(h, w, 4) RGBA, straight alpha; sizes may differ between layers."""
 
 BLACK = (0.0, 0.0, 0.0)
-
-
-class Mesh(Protocol):
-    """One layer: vertices (V, 3) float32, faces (F, 3) int32, st (V, 2) float32."""
-
-    @property
-    def vertices(self) -> NDArray[np.float32]: ...
-    @property
-    def faces(self) -> NDArray[np.int32]: ...
-    @property
-    def st(self) -> NDArray[np.float32]: ...
 
 
 class Layered(Protocol):
@@ -77,11 +67,17 @@ class Hits:
         return cls(np.concatenate([part.hit for part in parts], 1), np.concatenate([part.st for part in parts], 1))
 
 
-class AssetCaster:
-    """Casts rays at the meshes of an asset, one Embree scene a layer."""
+def layers_in(asset: Layered, frame: float) -> Sequence[Mesh]:
+    """The layers of an asset in a frame, in their own axes."""
+    return layers_at(asset.layers, getattr(asset, "track", None), frame)
 
-    def __init__(self, asset: Layered) -> None:
-        self._layers = [(EmbreeMesh(layer.vertices, layer.faces), layer.st[layer.faces]) for layer in asset.layers]
+
+class AssetCaster:
+    """Casts rays at the meshes of an asset as they are in a frame, or as they were made; one Embree scene a layer."""
+
+    def __init__(self, asset: Layered, frame: float | None = None) -> None:
+        layers = asset.layers if frame is None else layers_in(asset, frame)
+        self._layers = [(EmbreeMesh(layer.vertices, layer.faces), layer.st[layer.faces]) for layer in layers]
 
     def cast(self, camera: Camera) -> Hits:
         """Hits of the rays through all pixel centres of `camera`."""
@@ -150,12 +146,14 @@ def composite(
 
 
 def render_asset(asset: Layered, camera: Camera, frame: int, background: ArrayLike = BLACK) -> tuple[Image, Image]:
-    """One picture: rgb (H, W, 3) and alpha (H, W) of frame `frame`. For many, keep an `AssetCaster` and its `Hits`.
+    """One picture: rgb (H, W, 3) and alpha (H, W) of frame `frame`.
+
+    For many of a still head, keep a caster and its hits.
 
     Args:
         camera: in the world; an asset with a track stands there as it did in that frame.
     """
-    return composite(AssetCaster(asset).cast(seen_from(asset, camera, frame)), asset.frame(frame), background)
+    return composite(AssetCaster(asset, frame).cast(seen_from(asset, camera, frame)), asset.frame(frame), background)
 
 
 def seen_from(asset: Layered, camera: Camera, frame: float) -> Camera:

@@ -13,6 +13,7 @@ from torch import Tensor
 from facefolds_core.asset import Asset
 from facefolds_core.captures.scene import Scene
 from facefolds_core.geometry.cameras import Camera
+from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.geometry.sphere_uv import uv_to_st
 from facefolds_core.model import RadianceManifolds
 from facefolds_core.model.compositing import compositing_weights
@@ -39,12 +40,13 @@ class ModelView:
     Args:
         model: in evaluation mode.
         camera: in the model's axes.
-        to_room: (3, 3) rotation from these to the axes of the room, which reflected light is fixed to; None for none.
+        pose: of the head in the frame that is shown, from these axes to the room's, which reflected light and a torso
+            are fixed to; None of one that stands still.
     """
 
-    def __init__(self, model: RadianceManifolds, camera: Camera, to_room: NDArray[np.float64] | None = None) -> None:
+    def __init__(self, model: RadianceManifolds, camera: Camera, pose: Similarity | None = None) -> None:
         grids = isinstance(model.textures, GridTextures)
-        self._seen: _Grids | _Networks = (_Grids if grids else _Networks)(model, camera, to_room)
+        self._seen: _Grids | _Networks = (_Grids if grids else _Networks)(model, camera, pose)
 
     @torch.no_grad()
     def render(self, time: float) -> Pictures:
@@ -55,17 +57,17 @@ class ModelView:
 class _Grids:
     """Texel grids: looked up as the asset's textures are."""
 
-    def __init__(self, model: RadianceManifolds, camera: Camera, to_room: NDArray[np.float64] | None) -> None:
+    def __init__(self, model: RadianceManifolds, camera: Camera, pose: Similarity | None) -> None:
         assert isinstance(model.textures, GridTextures)
-        self._model, self._textures = model, model.textures
-        device = model.centre.device
+        self._model, self._textures, self._pose = model, model.textures, pose
+        to_room, device = None if pose is None else pose.rotation, model.centre.device
         self._to_room = None if to_room is None else torch.tensor(to_room, dtype=torch.float32, device=device)
         self._view = AreaView.of_hits(camera, self._hits)
 
     @torch.no_grad()
     def _hits(self, camera: Camera) -> tuple[Hits, Sequence[Image] | None]:
         """Of part of the picture, and what the reflection adds there."""
-        rays, crossings = _cross(self._model, camera)
+        rays, crossings = _cross(self._model, camera, self._pose)
         st = uv_to_st(self._model.chart.uv(crossings.points)[0], self._textures.window).float()
         shape = (camera.height, camera.width, self._model.num_layers)
         hits = Hits(crossings.hit.cpu().numpy().reshape(shape), st.cpu().numpy().reshape(*shape, 2))
@@ -88,9 +90,9 @@ class _Grids:
 class _Networks:
     """Textures that are evaluated at each crossing."""
 
-    def __init__(self, model: RadianceManifolds, camera: Camera, _: NDArray[np.float64] | None) -> None:
+    def __init__(self, model: RadianceManifolds, camera: Camera, pose: Similarity | None) -> None:
         fine = finer(camera)
-        rays, crossings = _cross(model, fine)
+        rays, crossings = _cross(model, fine, pose)
         self._model, self._size, self._hit = model, (fine.height, fine.width), crossings.hit
         self._ray, self._layer = crossings.hit.nonzero(as_tuple=True)
         self._uv = model.chart.uv(crossings.points[self._ray, self._layer])[0]
@@ -123,11 +125,11 @@ class _Networks:
         return pixel_means(image.clamp(0, 1).reshape(*self._size, 3).cpu().numpy())
 
 
-def _cross(model: RadianceManifolds, camera: Camera) -> tuple[list[Tensor], Crossings]:
+def _cross(model: RadianceManifolds, camera: Camera, pose: Similarity | None) -> tuple[list[Tensor], Crossings]:
     """Origins and directions [R, 3] through all pixel centres, and their crossings."""
     device = model.centre.device
     rays = [torch.tensor(np.reshape(part, (-1, 3)), dtype=torch.float32, device=device) for part in camera.rays()]
-    return rays, model.crossings(*rays)
+    return rays, model.crossings(rays[0], rays[1], pose)
 
 
 class PosedView:
@@ -160,8 +162,8 @@ class PosedView:
         camera = self._camera if self._poses is None else self._poses.camera(self._camera, frame)
         # Without gradients layers are crossed by compiled code: in each frame anew torch's own would take minutes.
         with nullcontext() if self._poses is None else torch.no_grad():
-            to_room = None if self._poses is None else self._poses.at(frame).rotation
-            self.model = ModelView(self._model, camera, to_room)
+            pose = None if self._poses is None else self._poses.at(frame)
+            self.model = ModelView(self._model, camera, pose)
 
     def _turn_asset(self, frame: int) -> None:
         self.asset = view_of(self._files.full, self._camera, frame)

@@ -99,7 +99,7 @@ def find_subject(
         splats = begun.part(joined(begun, scene))
     mattes.alone = splats
     fit, psnr = judged(scene, splats, views)
-    return FoundSubject(splats, psnr, fit), mattes
+    return FoundSubject(splats, psnr, fit, mattes.torso()), mattes
 
 
 def _agreeing(scene: Scene, mattes: Mattes, keys: Sequence[Key]) -> list[Key]:

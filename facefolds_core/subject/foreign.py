@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from facefolds_core.captures.scene import Scene
 from facefolds_core.errors import UserError
+from facefolds_core.geometry.quaternions import quaternion
 from facefolds_core.geometry.similarity import Similarity
-from facefolds_core.geometry.track import quaternion
 from facefolds_core.spacing import spread
 from facefolds_core.subject.drawing import render
 from facefolds_core.subject.ply import read_ply

@@ -16,6 +16,7 @@ from scipy.spatial import cKDTree
 from facefolds_core.captures.cutout import cut_from
 from facefolds_core.captures.scene import Scene
 from facefolds_core.geometry.cameras import Camera
+from facefolds_core.geometry.torso import Torso
 from facefolds_core.spacing import spread
 from facefolds_core.subject.cut_out import (
     Array,
@@ -43,7 +44,7 @@ from facefolds_core.subject.found import (
 )
 from facefolds_core.subject.plates import Start, from_plate
 from facefolds_core.subject.splats import Splats
-from facefolds_core.subject.standing import farthest_moved, if_still, in_frame, standing
+from facefolds_core.subject.standing import farthest_moved, if_still, in_frame, standing, torso_of
 from facefolds_core.subject.storage import Body
 from facefolds_core.system.threads import in_order
 
@@ -211,6 +212,14 @@ class Mattes:
         if self._labelled is None or self._labelled[0] is not self.alone:
             self._labelled = self.alone, self._alone_told()
         return self._labelled[1]
+
+    def torso(self) -> Torso | None:
+        """What stays in the room while the head turns, of the Gaussians that were trained with the subject cut out."""
+        assert self.alone is not None
+        poses = self.scene.poses
+        return (
+            None if poses is None else torso_of(self.alone, self._alone_stands(), poses.at(reference_frame(self.scene)))
+        )
 
     def _alone_told(self) -> Bool:
         """By the nearest Gaussian of the body; where there is none by cut-outs, as far as they are known without."""

@@ -14,6 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from facefolds_core.geometry.similarity import Similarity
+from facefolds_core.geometry.torso import Torso
 from facefolds_core.geometry.track import Track
 from facefolds_core.subject.fit import Target
 from facefolds_core.subject.foreign import moved
@@ -36,6 +38,43 @@ SHARE = 0.02
 """Of the Gaussians that are asked: where fewer stand, none does."""
 
 
+BAND = 0.08
+"""Width of what follows both head and torso, units: a neck's height. Where the head goes less far there, none folds."""
+RIDGE = 1e-3
+"""Of the plane's slope, against one that ends nowhere where head and torso lie quite apart."""
+ROUNDS = 25
+"""Newton's, of the plane."""
+APART = 0.9
+"""Least share of the opacity that lies on its own side of the plane; else there is none. `glasses` has 0.98."""
+
+
+def torso_of(splats: Splats, stands: Bool, pose: Similarity) -> Torso | None:
+    """The plane between what stands still and what moves with the head: logistic regression of the one on the places of
+    the Gaussians, each as much as it is opaque. None where nothing or all stands, or no plane parts them.
+
+    Args:
+        pose: of the head, whose own frame they are in, in the frame that they show; head -> world.
+    """
+    if stands.all() or not stands.any():
+        return None
+    weight = splats.opacities.astype(np.float64) / splats.opacities.sum()
+    places = splats.means.astype(np.float64)
+    middle = weight @ places
+    scale = float(np.sqrt(weight @ np.square(places - middle).sum(1)))
+    x = np.concatenate([(places - middle) / scale, np.ones((len(places), 1))], 1)
+    price, slope = RIDGE * np.diag([1.0, 1, 1, 0]), np.zeros(4)
+    for _ in range(ROUNDS):
+        chance = 1 / (1 + np.exp(-(x @ slope).clip(-30, 30)))
+        pull = x.T @ (weight * (chance - stands)) + price @ slope
+        curvature = (x * (weight * np.maximum(chance * (1 - chance), 1e-6))[:, None]).T @ x + price
+        slope = slope - np.linalg.solve(curvature, pull)
+    steep = max(float(np.linalg.norm(slope[:3])), 1e-12)
+    normal = slope[:3] / steep
+    border = float(normal @ middle) - scale * float(slope[3]) / steep
+    apart = float(weight[((places @ normal) > border) == stands].sum())
+    return Torso.at(normal, border - BAND / 2, BAND, pose) if apart >= APART else None
+
+
 def farthest_moved(poses: Track, first: int) -> list[int]:
     """Up to `FRAMES` frames that differ most from the first and from one another: by the head's turn, radians, and its
     shift, units."""
@@ -56,19 +95,16 @@ def if_still(splats: Splats, poses: Track, first: int, frame: int) -> Splats:
     return moved(splats, poses.at(frame).inverse().after(poses.at(first)))
 
 
-def in_frame(
-    splats: Splats, stands: Bool, poses: Track, first: int, frame: int, turning: Splats | None = None
-) -> Splats:
-    """Gaussians of the frame `first` in another, in the head's own frame: those that stand (N,) stay in the room.
+def in_frame(splats: Splats, stands: Bool, poses: Track, first: int, frame: int) -> Splats:
+    """Gaussians of the frame `first` in another, in the head's own frame: those that stand (N,) stay in the room."""
+    return splats if frame == first else in_part(splats, stands, poses.at(frame).inverse().after(poses.at(first)))
 
-    Args:
-        turning: all of them as they move with the head, where a tracked mesh says more than the poses do.
-    """
-    turning = splats if turning is None else turning
-    if frame == first or not stands.any():
-        return turning
-    still = if_still(splats, poses, first, frame)
-    return replace(splats, values=np.where(stands[:, None], still.values, turning.values))
+
+def in_part(splats: Splats, which: Bool, motion: Similarity) -> Splats:
+    """Gaussians of which some (N,) are moved."""
+    if not which.any():
+        return splats
+    return replace(splats, values=np.where(which[:, None], moved(splats, motion).values, splats.values))
 
 
 def standing(

@@ -15,6 +15,7 @@ from facefolds_core.errors import UserError
 from facefolds_core.files.archives import read_npz
 from facefolds_core.files.reading import remake
 from facefolds_core.files.writing import atomic_file
+from facefolds_core.geometry.torso import NUMBERS, Torso
 from facefolds_core.subject.cameras import CameraFit
 from facefolds_core.subject.splats import COLUMNS, Splats
 
@@ -31,11 +32,13 @@ class FoundSubject:
         splats: of it alone, in the head's own frame.
         psnr: of their pictures over the training pictures with the subject cut out, dB.
         cameras: what single training cameras do differently.
+        torso: what of it stays in the room while the head turns; None where nothing does.
     """
 
     splats: Splats
     psnr: float
     cameras: CameraFit
+    torso: Torso | None = None
 
 
 @dataclass(frozen=True)
@@ -81,8 +84,10 @@ def read_body(path: Path, frames: int) -> Body:
 def write_found(path: Path, found: FoundSubject) -> None:
     """Write the file, whole or not at all."""
     gains, errors, psnr = found.cameras.measured, found.cameras.errors, np.array([found.psnr])
+    arrays = {"values": found.splats.values, "psnr": psnr, "gains": gains, "errors": errors}
+    arrays |= {} if found.torso is None else {"torso": found.torso.numbers}
     with atomic_file(path) as temporary, temporary.open("wb") as file:
-        np.savez(file, values=found.splats.values, psnr=psnr, gains=gains, errors=errors)
+        np.savez(file, **arrays)  # type: ignore[arg-type]
 
 
 def read_found(path: Path, cameras: int) -> FoundSubject:
@@ -96,12 +101,15 @@ def read_found(path: Path, cameras: int) -> FoundSubject:
     """
     arrays = read_npz(path, DAMAGED)
     shapes = {"values": (None, COLUMNS), "psnr": (1,), "gains": (cameras, 3), "errors": (cameras,)}
-    _check(path, arrays, shapes, {})
+    _check(path, arrays, shapes | ({"torso": (NUMBERS,)} if "torso" in arrays else {}), {})
     values = arrays["values"].astype(np.float32)
     if not len(values) or not np.isfinite(values).all() or not (arrays["gains"] > 0).all():
         raise UserError(DAMAGED, file=path, expected="finite numbers, gains above 0", remedy=remake(path))
+    torso = Torso.of(arrays["torso"]) if "torso" in arrays else None
+    if torso is not None and not torso.sound:
+        raise UserError(DAMAGED, file=path, place="torso", found=str(torso), remedy=remake(path))
     fit = CameraFit(arrays["gains"].astype(np.float64), arrays["errors"].astype(np.float64))
-    return FoundSubject(Splats(values, np.zeros(3, np.float32)), float(arrays["psnr"][0]), fit)
+    return FoundSubject(Splats(values, np.zeros(3, np.float32)), float(arrays["psnr"][0]), fit, torso)
 
 
 def _check(

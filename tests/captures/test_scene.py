@@ -15,6 +15,7 @@ from facefolds_core.errors import UserError
 from facefolds_core.facts import fact
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.similarity import Similarity
+from facefolds_core.geometry.torso import Torso
 from facefolds_core.geometry.track import Track
 from tests.memory import peak_of
 
@@ -64,6 +65,11 @@ def test_views_of_a_turning_head_spread_over_the_frames(tmp_path: Path) -> None:
     assert second == turned.camera_in_head(2, 1).w2c.tolist()
     assert len(turned.views_of("train", 2)) == 4
     assert [view.name for view in scene(tmp_path).views_of("train", 2)] == ["a", "c"]
+    torso = Torso.at([0.0, 0.0, -1.0], 0.0, 0.1, turned.poses.at(1))
+    *posed, one, two = turned.with_torso(torso).views_of("train")
+    assert [view.w2c.tolist() for view in posed] == [first, second]
+    assert [view.w2c.tolist() for view in (one, two)] == [turned.camera_in_head(i, 1).w2c.tolist() for i in (0, 2)]
+    assert scene(tmp_path).with_torso(torso).poses is None
 
 
 def test_masks_and_surface_are_optional(tmp_path: Path) -> None:

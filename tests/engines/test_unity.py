@@ -18,7 +18,8 @@ from PIL import Image
 from facefolds_core.asset import Asset, read_asset
 from facefolds_core.engines._folder import rgb_picture
 from facefolds_core.geometry.cameras import Camera
-from facefolds_core.geometry.track import Track, rotation
+from facefolds_core.geometry.quaternions import rotation
+from facefolds_core.geometry.track import Track
 from facefolds_core.rendering import AssetCaster
 from tests.assets import SOURCE, make_asset
 from tests.engines import unity_shaders

@@ -25,6 +25,7 @@ from facefolds_core.export.stores import (
 )
 from facefolds_core.geometry.chart import Belt, Chart
 from facefolds_core.geometry.meshes import Surface, TexturedMesh
+from tests.assets import TORSO
 from tests.ellipsoids import Ellipsoids
 
 TRIANGLE = TexturedMesh(
@@ -74,6 +75,11 @@ def test_the_chart_can_be_read_without_the_samples(tmp_path: Path, grids: Grids,
     assert read_places(tmp_path / "grids.npz")[1] == read_grids(tmp_path / "grids.npz").chart == chart
 
 
+def test_a_torso_comes_back_with_the_samples(tmp_path: Path, grids: Grids) -> None:
+    write_grids(tmp_path / "grids.npz", replace(grids, torso=TORSO))
+    assert read_places(tmp_path / "grids.npz")[3] == read_grids(tmp_path / "grids.npz").torso == TORSO
+
+
 @pytest.mark.parametrize("length", [0, 10, 500, 2000])
 def test_a_truncated_file_is_an_error(tmp_path: Path, grids: Grids, length: int) -> None:
     path = tmp_path / "grids.npz"
@@ -107,6 +113,7 @@ WRONG: list[tuple[str, dict[str, Any], str]] = [
     ("grids", {"valid": np.ones((2, 8, 8), np.uint8)}, "valid"),
     ("grids", {"opacity": np.ones((2, 8, 8), bool)}, "opacity"),
     ("grids", {"chart": Chart((0.0, np.nan, 0.0))}, "centre"),
+    ("grids", {"torso": replace(TORSO, normal=(0.0, 0.0, 2.0))}, "torso"),
     ("grids", {"windows": np.tile([0.5, -0.5, -1.0, 1.0], (2, 1))}, "windows"),
     ("sheets", {"radii": np.ones((2, 8, 7), np.float32)}, "radii"),
     ("sheets", {"radii": np.zeros((2, 8, 8), np.float32)}, "radii"),

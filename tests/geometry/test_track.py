@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from facefolds_core.geometry.track import Track, mean_rotation, quaternion, rigid_motion, rotation, slerp
+from facefolds_core.geometry.quaternions import quaternion, rotation
+from facefolds_core.geometry.track import Track, mean_rotation, rigid_motion, slerp
 from tests.scenes import look_at_origin
 
 

@@ -85,7 +85,17 @@ def test_strides_through_empty_space_miss_nothing(chart: Chart, holes: bool) -> 
     assert (high[0] < rho.min(initial=1, where=~np.isnan(rho))).mean() > 0.1
     found = [
         crossing_distances(
-            origins - np.array(C), directions, rho, edges, belt, bounds(rho), h, whole, manifolds.radius, radial.STEP
+            origins - np.array(C),
+            directions,
+            rho,
+            edges,
+            belt,
+            bounds(rho),
+            h,
+            whole,
+            manifolds.radius,
+            radial.STEP,
+            None,
         )
         for h in (high, np.full_like(high, np.inf))
     ]

@@ -21,7 +21,8 @@ from facefolds_core.asset.manifest_extras import FilmedView
 from facefolds_core.cli import app
 from facefolds_core.cli.render import Kind, film_path, film_rate, parse_colour, parse_size, shrink
 from facefolds_core.errors import UserError
-from facefolds_core.rendering import AssetCaster, composite
+from facefolds_core.geometry.torso import Torso
+from facefolds_core.rendering import AssetCaster, composite, render_asset
 from facefolds_core.rendering.camera_paths import Eye, camera_of, distance_to_fit, fly_through, frame_due, turntable
 from facefolds_core.rendering.opengl import OpenGLRenderer
 from facefolds_core.rendering.opengl_reflection import Glossy
@@ -78,6 +79,18 @@ def test_the_light_stays_with_the_room_where_the_head_turns(caps: Asset) -> None
         rgb, _ = renderer.render(camera, 2)
     assert psnr(rgb, expected) > 45
     assert psnr(along, expected) < 25  # light that turns with the head is another picture
+
+
+def test_a_torso_stays_in_the_room(caps: Asset) -> None:
+    level, camera = with_track(caps.full, 30), look_at_origin("camera", 30, 10, 120)
+    assert level.track is not None
+    torso = Torso.at([0.0, 0.0, -1.0], -0.05, 0.1, level.track.at(0))
+    over = replace(level, track=replace(level.track, torso=torso))
+    expected, whole = (render_asset(one, camera, 2)[0] for one in (over, level))
+    with OpenGLRenderer(over) as renderer:
+        rgb, _ = renderer.render(camera, 2)
+    assert psnr(rgb, expected) > 45
+    assert psnr(whole, expected) < 25
 
 
 def test_a_background_picture_shines_through(caps: Asset) -> None:

@@ -29,6 +29,7 @@ from facefolds_core.subject.ply import write_ply
 from facefolds_core.subject.sheet import RED, tile
 from facefolds_core.subject.splats import MEAN, OPACITY, SCALE, Splats
 from facefolds_core.subject.storage import BODY, Body, read_found, write_body, write_found
+from tests.assets import TORSO
 from tests.scenes import CENTRE, OPAQUE, gaussians, make_scene, render
 
 SIZE = 24
@@ -168,7 +169,13 @@ def test_a_matte_is_known_without_gaussians_beside_a_plate_only(scene: Scene, tm
     assert not Mattes(bare).known((1, 0)) and Mattes(bare, {(1, 0): np.zeros((8, 8, 1), np.uint8)}).known((1, 0))
 
 
-@pytest.mark.parametrize("fault", ["cut", "cameras", "infinite", "missing"])
+def test_a_torso_comes_back_with_the_gaussians(tmp_path: Path) -> None:
+    found = replace(subject_in(make_scene(tmp_path, size=8, mattes=True)), torso=TORSO)
+    write_found(tmp_path / "gaussians.npz", found)
+    assert read_found(tmp_path / "gaussians.npz", 6).torso == TORSO
+
+
+@pytest.mark.parametrize("fault", ["cut", "cameras", "infinite", "missing", "torso"])
 def test_damaged_gaussians_are_refused_by_name(tmp_path: Path, fault: str) -> None:
     scene = make_scene(tmp_path, size=8, mattes=True)
     path = tmp_path / "gaussians.npz"
@@ -178,6 +185,8 @@ def test_damaged_gaussians_are_refused_by_name(tmp_path: Path, fault: str) -> No
     elif fault == "infinite":
         found.splats.values[3, 4] = np.inf
         write_found(path, found)
+    elif fault == "torso":
+        write_found(path, replace(found, torso=replace(TORSO, band=0.0)))
     elif fault == "missing":
         np.savez(path, values=found.splats.values)
     with pytest.raises(UserError, match="Gaussians are damaged") as caught:

@@ -11,8 +11,9 @@ import pytest
 from facefolds_core.captures.scene import Scene, write_scene
 from facefolds_core.errors import UserError
 from facefolds_core.files.frame_store import write_frames
+from facefolds_core.geometry.quaternions import rotation
 from facefolds_core.geometry.similarity import Similarity
-from facefolds_core.geometry.track import Track, rotation
+from facefolds_core.geometry.track import Track
 from facefolds_core.subject import mattes as mattes_module
 from facefolds_core.subject.cut_out import EdgeParams, agreement
 from facefolds_core.subject.drawing import render

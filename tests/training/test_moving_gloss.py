@@ -10,6 +10,7 @@ import pytest
 import torch
 
 from facefolds_core.captures.scene import Scene
+from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.geometry.track import Track
 from facefolds_core.model import RadianceManifolds
 from facefolds_core.model.grids import GridTextures
@@ -49,7 +50,8 @@ def model() -> RadianceManifolds:
 def test_a_turned_head_mirrors_what_is_there_in_the_room(scene: Scene) -> None:
     """A quarter turn to its left, and to its right: what it has before it is what the room has there."""
     camera, turned = scene.cameras[scene.indices("train")[0]], about((0, 0, 1), 90)
-    pictures = [ModelView(model(), camera, to_room).render(0) for to_room in (None, np.eye(3), turned, turned.T)]
+    poses = [None, *(Similarity(1.0, R, np.zeros(3)) for R in (np.eye(3), turned, turned.T))]
+    pictures = [ModelView(model(), camera, pose).render(0) for pose in poses]
     brightness = [float(picture[0].mean()) for picture in pictures]
     np.testing.assert_array_equal(pictures[0][0], pictures[1][0])
     assert brightness[2] > 2 * brightness[3]

@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from facefolds_core.asset import Asset, read_asset
+from facefolds_core.asset.writer import AssetSource
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.rendering.areas import AreaView
 from facefolds_core.rendering.pixels import lit_hits, render
 from facefolds_core.rendering.raster import cast_layers
-from tests.assets import MOVING, make_asset
+from tests.assets import MOVING, OVER_TORSO, make_asset
 from tests.pictures import GREY, GREY_VALUE, expected_means, expected_pictures, five_cameras, psnr
 from tests.viewer.conftest import NO_WEBCODECS, NewPlayer
 from tests.viewer.fixtures import add_reflection, moving_asset
@@ -146,8 +147,9 @@ def exposed(rgba: NDArray[np.generic], factor: float) -> NDArray[np.float32]:
     return np.concatenate([np.minimum(back, 1), values[..., 3:]], -1).astype(np.float32)
 
 
-def test_a_head_that_moves_stands_where_it_stood(new_player: NewPlayer, tmp_path: Path) -> None:
-    asset = make_asset(tmp_path / "asset", layers=3, frames=3, resolution=64, source=MOVING)
+@pytest.mark.parametrize("source", [MOVING, OVER_TORSO], ids=["whole", "over a torso"])
+def test_a_head_that_moves_stands_where_it_stood(source: AssetSource, new_player: NewPlayer, tmp_path: Path) -> None:
+    asset = make_asset(tmp_path / "asset", layers=3, frames=3, resolution=64, source=source)
     player = new_player({"asset": asset.folder})
     player.open("asset")
     player.run("e.background = v; e.effects = false", GREY)

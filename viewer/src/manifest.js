@@ -1,7 +1,7 @@
 /** manifest.json, format version 4 (docs/reference/asset-format.md): read, checked as far as the player relies on it. */
 import { PlayerError } from "./errors.js";
 import { broughtUp } from "./older.js";
-import { POSE_BYTES } from "./track.js";
+import { matrixOf, POSE_BYTES } from "./track.js";
 
 export const VERSION = 4;
 const PLAIN_NAME = /^[A-Za-z0-9_][A-Za-z0-9_.-]*$/;
@@ -22,7 +22,8 @@ const PLAIN_NAME = /^[A-Za-z0-9_][A-Za-z0-9_.-]*$/;
  *   w2c: number[][]}} Photo
  * @typedef {{subject: string, generator: string, centre: number[], levels: Level[], audio: FileEntry & {mime: string} | null,
  *   poster: FileEntry | null, photos: Photo[], view: import("./limits.js").Filmed | null,
- *   track: import("./track.js").Pose[] | null, trackFile: FileEntry | null}} Manifest `track`: of version 3
+ *   track: import("./track.js").Pose[] | null, trackFile: FileEntry | null,
+ *   torso: import("./track.js").Torso | null}} Manifest `track`: of version 3
  */
 
 /**
@@ -100,6 +101,7 @@ function readManifest(value) {
     photos: (value.photos ?? []).map(readPhoto),
     trackFile: value.track_file ? readTrackFile(value.track_file, levels[0].texture.frames) : null,
     track: value.track ? readTrack(value.track, levels[0].texture.frames) : null,
+    torso: value.torso ? readTorso(value.torso) : null,
     view: value.view ? { ...directions(value.view), good: value.view.good ? directions(value.view.good) : null } : null,
   };
 }
@@ -239,6 +241,20 @@ function rectangle(value, place) {
 function readTrackFile(entry, frames) {
   check(entry.bytes === POSE_BYTES * frames, `track_file has ${entry.bytes} bytes for ${frames} frames`);
   return readFile(entry, entry.file, "track_file");
+}
+
+function readTorso({ normal, offset, band, quaternion, translation }) {
+  const [n, q, t] = [
+    list(normal, "torso.normal"),
+    list(quaternion, "torso.quaternion"),
+    list(translation, "torso.translation"),
+  ];
+  const numbers = [...n, offset, band, ...q, ...t];
+  check(
+    n.length === 3 && q.length === 4 && t.length === 3 && numbers.every(Number.isFinite) && band >= 1e-6,
+    "torso is no plane",
+  );
+  return { normal, offset, band, rest: matrixOf({ quaternion, translation }) };
 }
 
 function readTrack(value, frames) {

@@ -19,6 +19,12 @@ export function viewFrom(right, up, back, position) {
   return fromRows([row(right), row(up), row(back), [0, 0, 0, 1]]);
 }
 
+/** @param {Matrix} m a rotation and a shift @returns {Matrix} */
+export const inverseOf = (m) => {
+  const [x, y, z] = eyeOf(m);
+  return [m[0], m[4], m[8], 0, m[1], m[5], m[9], 0, m[2], m[6], m[10], 0, x, y, z, 1];
+};
+
 /** @param {ArrayLike<number>} a @param {ArrayLike<number>} b @returns {Matrix} a b */
 export const multiplied = (a, b) =>
   Array.from({ length: 16 }, (_, i) =>

@@ -390,7 +390,8 @@ export class Player extends EventTarget {
 
   /** The head where it stood in the frame shown, or at rest. */
   #place() {
-    const { track } = this.manifest;
+    const { track, torso } = this.manifest;
+    this.renderer.setTorso(torso);
     this.renderer.setPose(track && this.shown >= 0 ? matrixOf(track[this.shown]) : null, this.held);
     this.stale = true;
   }

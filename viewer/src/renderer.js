@@ -10,7 +10,7 @@ import { Graphics, SIDE } from "./gl/graphics.js";
 import { Target } from "./gl/target.js";
 import { Upload } from "./gl/upload.js";
 import { drawBackdrop, drawShadow, fillBackdrop } from "./ground.js";
-import { eyeOf, IDENTITY, multiplied, transformed } from "./matrices.js";
+import { eyeOf, IDENTITY, inverseOf, multiplied, transformed } from "./matrices.js";
 import { COLOUR_FRAGMENT, DEPTH_FRAGMENT, KINDS, VERTEX, WIRE_FRAGMENT } from "./shaders.js";
 
 const SPREAD = { step: 0.4, all: 4 }; // heights of the head from layer to layer when fully pulled apart, and at most in all
@@ -25,6 +25,8 @@ export class LayerRenderer {
     this.level = null;
     this.pose = null;
     this.turn = null;
+    this.torso = null;
+    this.stay = null;
     this.upload = null;
     this.visible = [];
     this.effectsOn = true;
@@ -91,6 +93,21 @@ export class LayerRenderer {
   setPose(matrix, held) {
     this.pose = held ? null : matrix;
     this.turn = matrix;
+    this.stay = this.pose && this.torso ? multiplied(inverseOf(this.pose), this.torso.rest) : null;
+  }
+
+  /** What stays in the room while the head turns. @param {import("./track.js").Torso | null} torso */
+  setTorso(torso) {
+    this.torso = torso;
+  }
+
+  /** Where a point of the layers is in this frame, in the meshes' own axes; the shader's own. @param {ArrayLike<number>} p */
+  placed(p) {
+    if (!this.stay) return p;
+    const { normal, offset, band } = this.torso;
+    const along = normal.reduce((sum, n, i) => sum + n * p[i], 0);
+    const share = Math.max(0, Math.min(1, (along - offset) / band));
+    return transformed(this.stay, p).map((there, i) => p[i] + share * (there - p[i]));
   }
 
   /** After a lost context came back. The frame has to be given again. */
@@ -246,6 +263,11 @@ export class LayerRenderer {
       gl.useProgram(program);
       gl.uniformMatrix4fv(at.projection, false, projection);
       gl.uniformMatrix4fv(at.view, false, view);
+      gl.uniform1f(at.band, this.stay ? this.torso.band : 0);
+      if (this.stay) {
+        gl.uniform4f(at.torso, ...this.torso.normal, this.torso.offset);
+        gl.uniformMatrix4fv(at.stay, false, this.stay);
+      }
       return { program, at };
     };
     const depth = prepared(DEPTH_FRAGMENT);

@@ -7,14 +7,23 @@ invariant gl_Position;
 uniform mat4 projection;
 uniform mat4 view;
 uniform vec3 shift; // of the layer, when the layers are pulled apart
+uniform vec4 torso; // normal and offset of the plane from which on points stay in the room while the head turns
+uniform float band; // within which they come to stay; 0: nothing does
+uniform mat4 stay; // where points of the layers that stay are, in the meshes' own frame
 layout(location = 0) in vec3 position;
 layout(location = 1) in vec2 uv;
 out vec2 st;
 out vec3 point;
+out vec3 made; // the same, as the layers were made
 void main() {
   st = uv;
+  made = position;
   point = position;
-  gl_Position = projection * (view * vec4(position + shift, 1.0));
+  if (band > 0.0) {
+    float share = clamp((dot(torso.xyz, position) - torso.w) / band, 0.0, 1.0);
+    point = mix(position, (stay * vec4(position, 1.0)).xyz, share);
+  }
+  gl_Position = projection * (view * vec4(point + shift, 1.0));
 }`;
 
 export const DEPTH_FRAGMENT = `#version 300 es
@@ -49,6 +58,7 @@ uniform mat3 toRoom; // from the meshes' own axes to those of the room, which th
 #endif
 in vec2 st;
 in vec3 point;
+in vec3 made;
 out vec4 result;
 
 vec4 lookAt(sampler2D image, vec4 rect, vec2 at) {
@@ -87,7 +97,7 @@ void main() {
 #endif
   if (exposure != 1.0) colour = exposed(colour);
   if (hems.x < 3.14) {
-    vec3 off = point - centre;
+    vec3 off = made - centre;
     float from = off.y < 0.0 ? hems.x : hems.y;
     float behind = atan(length(vec2(off.y, max(off.z, 0.0))), off.x); // the crown is not behind
     alpha *= 1.0 - smoothstep(from, from + 0.5, behind);

@@ -56,10 +56,10 @@ export function projected(m, [x, y, z]) {
 }
 
 /** What of a layer is nearest where it is drawn at (x, y) of clip space. @returns {{place: number[], point: number[]} | null} */
-function nearestUnder(geometry, [u0, u1, v0, v1], matrix, at) {
+function nearestUnder(geometry, [u0, u1, v0, v1], matrix, placed, at) {
   const { position, uv } = geometry;
   const seen = Array.from({ length: position.length / 3 }, (_, k) =>
-    projected(matrix, position.subarray(3 * k, 3 * k + 3)),
+    projected(matrix, placed(position.subarray(3 * k, 3 * k + 3))),
   );
   let [nearest, hit] = [Infinity, null];
   eachTriangle(
@@ -73,7 +73,7 @@ function nearestUnder(geometry, [u0, u1, v0, v1], matrix, at) {
       nearest = away;
       const parts = inverse.map((one) => one * away);
       const [s, t] = mixed(parts, corners.map((k) => [uv[2 * k], uv[2 * k + 1]])); // prettier-ignore
-      const point = mixed(parts, corners.map((k) => [...position.subarray(3 * k, 3 * k + 3)])); // prettier-ignore
+      const point = mixed(parts, corners.map((k) => [...placed(position.subarray(3 * k, 3 * k + 3))])); // prettier-ignore
       hit = { place: [u1 - t * (u1 - u0), v0 + s * (v1 - v0)], point };
     },
   );
@@ -109,6 +109,12 @@ export function surfaceUnder(player, at) {
   renderer.setVisible(visible);
   if (layer === visible.length) return null;
   const matrix = multiplied(projection, renderer.pose ? multiplied(view, renderer.pose) : view);
-  const hit = nearestUnder(level.geometries[layer], level.info.layers[layer].window, matrix, at);
+  const hit = nearestUnder(
+    level.geometries[layer],
+    level.info.layers[layer].window,
+    matrix,
+    (p) => renderer.placed(p),
+    at,
+  );
   return hit && { ...hit, layer };
 }

@@ -7,6 +7,8 @@ export const POSE_BYTES = 4 * NUMBERS;
 
 /**
  * @typedef {{quaternion: [number, number, number, number], translation: [number, number, number]}} Pose w, x, y, z
+ * @typedef {{normal: number[], offset: number, band: number, rest: import("./matrices.js").Matrix}} Torso what stays in
+ *   the room while the head turns: beyond a plane; `rest` is the pose in which the layers were made
  * @param {Pose} pose
  * @returns {import("./matrices.js").Matrix} from the meshes' own frame to the world
  */

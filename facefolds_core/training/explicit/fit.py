@@ -15,6 +15,7 @@ from facefolds_core.errors import UserError
 from facefolds_core.facts import Fact, fact
 from facefolds_core.geometry.chart import Chart
 from facefolds_core.geometry.sphere_uv import Window
+from facefolds_core.geometry.torso import Torso
 from facefolds_core.params import ExplicitParams, GeometryParams, StartParams
 from facefolds_core.rendering.compositing import transmittance_before
 from facefolds_core.subject.found import reference_frame
@@ -79,6 +80,7 @@ class Fit:
         volume: the subject, for what each layer begins with.
         losses: of the candidates for the chart, the share of the visible surface that each loses.
         start_psnr: of the subject's Gaussians over the training pictures, dB.
+        torso: what of the subject stays in the room while the head turns.
     """
 
     chart: Chart
@@ -95,6 +97,7 @@ class Fit:
     volume: Volume
     losses: dict[Chart, float]
     start_psnr: float
+    torso: Torso | None = None
 
 
 def fit_scene(scene: Scene, subject: FoundSubject, params: ExplicitParams, others: Sequence[Splats] = ()) -> Fit:
@@ -154,6 +157,7 @@ def fit_scene(scene: Scene, subject: FoundSubject, params: ExplicitParams, other
         volume=volume,
         losses=losses,
         start_psnr=subject.psnr,
+        torso=subject.torso,
     )
 
 

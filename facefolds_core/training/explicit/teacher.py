@@ -10,19 +10,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from facefolds_core.captures.scene import Scene
 from facefolds_core.geometry.cameras import Camera
-from facefolds_core.geometry.track import Track
+from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.subject.drawing import draw, view_of
 from facefolds_core.subject.found import reference_frame
 from facefolds_core.subject.frames import changed_to, mean_errors, ridden, targets_of
 from facefolds_core.subject.splats import Splats
-from facefolds_core.subject.standing import farthest_moved, if_still, in_frame, standing
+from facefolds_core.subject.standing import in_part
 from facefolds_core.subject.storage import FoundSubject
 from facefolds_core.subject.virtual import seen_by_few, virtual_cameras
 from facefolds_core.training.explicit.warnings import MIN_START_PSNR
@@ -68,7 +68,7 @@ class Teacher:
         self._usual: NDArray[np.float32] | None = None
         self._known = {self._first: splats}
         self._mesh: NDArray[np.float32] | None = None
-        self._stand = np.zeros(len(splats), bool)
+        self._torso = found.torso
         real = self._real(self._first)
         self._believed = found.psnr >= MIN_START_PSNR
         cameras = virtual_cameras(real, splats, (scene.width, scene.height)) if self._believed else ()
@@ -80,7 +80,7 @@ class Teacher:
 
     def others(self, photos: Callable[[int], Image]) -> list[Splats]:
         """The Gaussians of the `OTHERS` frames that look least like that of the start and one another. From then on it
-        is known whether Gaussians ride on the tracked mesh, and which stand still while the head turns.
+        is known whether Gaussians ride on the tracked mesh.
 
         Args:
             photos: as of `cut`.
@@ -94,17 +94,11 @@ class Teacher:
         surface = self._scene.load_surface()
         if surface is not None and all(self._rides(surface[0], frame, photos) for frame in others):
             self._mesh = surface[0]
-        if self._scene.poses is not None:
-            self._stand = self._standing(self._scene.poses, photos)
         return [self._at(frame, photos) for frame in others]
 
     def moved(self, frame: int) -> Splats | None:
-        """The Gaussians of a frame as the tracked mesh says, but for those that stand still while the head turns; None
-        where they are those of the start, or nothing says where they are."""
-        if frame == self._first or (self._mesh is None and not self._stand.any()):
-            return None
-        poses, turning = self._scene.poses, self._turning(frame)
-        return turning if poses is None else in_frame(self._splats, self._stand, poses, self._first, frame, turning)
+        """The Gaussians of a frame as the tracked mesh says; None where there is none, or they are the start's."""
+        return None if frame == self._first or self._mesh is None else self._ridden(self._mesh, frame)
 
     def cut(self, frame: int, photos: Callable[[int], Image]) -> Image:
         """(V, H W, 4) RGBA of a frame, colours times opacity.
@@ -115,34 +109,38 @@ class Teacher:
         return self._drawn(self._at(frame, photos) if self._views else self._splats)
 
     def _at(self, frame: int, photos: Callable[[int], Image]) -> Splats:
-        """The Gaussians of a frame; they are kept, since pictures may be asked for again."""
+        """The Gaussians of a frame, as the layers hold them: a torso that stays in the room is where it was made. They
+        are kept, since pictures may be asked for again."""
         if frame not in self._known:
             if self._usual is None:
-                self._usual = mean_errors(self._splats, targets_of(self._real(self._first), photos(self._first)))
+                shown = in_part(self._splats, *self._turned(self._first))  # of a part of a take the pose is another
+                self._usual = mean_errors(shown, targets_of(self._real(self._first), photos(self._first)))
             targets = targets_of(self._real(frame), photos(frame))
-            moved = self.moved(frame)
-            begun = self._splats if moved is None else moved
-            self._known[frame] = changed_to(begun, self._usual, targets, self._seed + frame)
+            begun = self.moved(frame) or self._splats
+            stays, shift = self._turned(frame)
+            turned = in_part(begun, stays, shift)
+            changed = changed_to(turned, self._usual, targets, self._seed + frame)
+            self._known[frame] = in_part(changed, stays, shift.inverse())
         return self._known[frame]
+
+    def _turned(self, frame: int) -> tuple[NDArray[np.bool_], Similarity]:
+        """(N,) which Gaussians stay in the room, and how these move in the head's own frame."""
+        poses, torso = self._scene.poses, self._torso
+        if poses is None or torso is None:
+            return np.zeros(len(self._splats), bool), Similarity.identity()
+        return torso.share(self._splats.means) > 0.5, torso.shift(poses.at(frame))
 
     def _ridden(self, mesh: NDArray[np.float32], frame: int) -> Splats:
         start, now = (mesh[k].astype(np.float64) for k in (self._first, frame))
-        return ridden(self._splats, start, now)
-
-    def _turning(self, frame: int) -> Splats:
-        """All Gaussians of a frame as they move with the head."""
-        return self._splats if self._mesh is None else self._ridden(self._mesh, frame)
-
-    def _standing(self, poses: Track, photos: Callable[[int], Image]) -> NDArray[np.bool_]:
-        """(N,) those that stand still while the head turns."""
-        frames = farthest_moved(poses, self._first)
-        pairs = [(self._turning(k), if_still(self._splats, poses, self._first, k)) for k in frames]
-        return standing(pairs, [targets_of(self._real(k), photos(k)) for k in frames], self._splats.means)
+        moved, (stays, _) = ridden(self._splats, start, now), self._turned(frame)
+        return replace(moved, values=np.where(stays[:, None], self._splats.values, moved.values))
 
     def _rides(self, mesh: NDArray[np.float32], frame: int, photos: Callable[[int], Image]) -> bool:
         """Whether Gaussians that ride on the mesh (K, V, 3) explain the photos of a frame better."""
         targets = targets_of(self._real(frame), photos(frame))
-        still, riding = (mean_errors(s, targets).mean() for s in (self._splats, self._ridden(mesh, frame)))
+        stays, shift = self._turned(frame)
+        both = (in_part(one, stays, shift) for one in (self._splats, self._ridden(mesh, frame)))
+        still, riding = (mean_errors(one, targets).mean() for one in both)
         return bool(riding < still)
 
     def _real(self, frame: int) -> list[Camera]:

@@ -83,7 +83,13 @@ class Trainer:
         halfwidth = self.geometry * halfwidth + reach
         inner = (self.middle - halfwidth).numpy().astype(np.float64)
         second = torch.from_numpy(second_layers(self.fit.second, inner)) if self.layers > self.params.layers else None
-        return RadialManifolds(self.fit.chart, self.fit.window, self.middle, halfwidth, self.params.layers, second)
+        return self._layers(self.middle, halfwidth, self.params.layers, second)
+
+    def _layers(
+        self, middle: torch.Tensor, halfwidth: torch.Tensor, count: int, second: torch.Tensor | None
+    ) -> RadialManifolds:
+        fit = self.fit
+        return RadialManifolds(fit.chart, fit.window, middle, halfwidth, count, second, fit.torso)
 
     def run(self, level: Level, number: int, live: Live, bar: tqdm) -> None:
         """One level.
@@ -248,7 +254,7 @@ class Trainer:
         halfwidth = (0.5 * (outer - inner)).clamp(min=1e-6)
         second = radii[..., below].nan_to_num() if below else None
         middle = 0.5 * (outer + inner)
-        manifolds = RadialManifolds(self.fit.chart, self.fit.window, middle, halfwidth, last - first + 1, second)
+        manifolds = self._layers(middle, halfwidth, last - first + 1, second)
         reflection = self.gloss.model()
         textures = GridTextures(self.fit.window, (h, w), len(stay), self.scene.num_frames, reflection)
         with torch.no_grad():
@@ -259,6 +265,7 @@ class Trainer:
         spec = ExplicitSpec(
             centre=self.fit.chart.centre,
             belt=self.fit.chart.belt,
+            torso=self.fit.torso,
             window=self.fit.window,
             nodes=(self.middle.shape[0], self.middle.shape[1]),
             texels=(h, w),

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from facefolds_core.captures.scene import Scene
 from facefolds_core.errors import UserError
 from facefolds_core.geometry.cameras import Camera
+from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.model.radial import RadialManifolds
 from facefolds_core.model.radial_kernel import texture_positions
 from facefolds_core.params import MovingParams
@@ -104,7 +105,7 @@ class Tracer:
         self.count = len(self._real) + (0 if virtual is None else len(virtual.cameras))
         self._centre = manifolds.centre.cpu().numpy().astype(np.float64)
         self._window, self._trace = np.array(manifolds.window), manifolds.tracer()
-        self._belt = manifolds.chart.numbers
+        self._belt, self._bend = manifolds.chart.numbers, manifolds.bend
 
     def views(self, position: int, first: int, stride: int, frames: Sequence[int], fine: bool) -> Views:
         """Every `stride`-th pixel from number `first` on, if its rays meet a layer; of virtual cameras fewer.
@@ -114,12 +115,12 @@ class Tracer:
             frames: in which outlines count; the camera stands as in the first.
             fine: whether pixels at outlines have finer rays.
         """
-        camera = self._camera(position, frames[0])
+        camera, pose = self._camera(position, frames[0]), self._pose(position, frames[0])
         pixels = self._pixels(position, first, stride)
         centres = np.stack([pixels % camera.width, pixels // camera.width], -1) + 0.5
-        codes, directions = self._codes(camera, centres)
+        codes, directions = self._codes(camera, centres, pose)
         around = np.flatnonzero(self._outline(position, frames).ravel()[pixels]) if fine else np.zeros(0, np.int64)
-        finer = np.stack([self._codes(camera, centres[around] + offset)[0] for offset in FINER], 1)
+        finer = np.stack([self._codes(camera, centres[around] + offset, pose)[0] for offset in FINER], 1)
         hit = np.asarray((codes[..., 0] > 0).any(1))
         hit[around] |= np.asarray((finer[..., 0] > 0).any((1, 2)))
         which = np.full(len(pixels), -1, np.int32)
@@ -137,12 +138,20 @@ class Tracer:
         wanted = self._virtual.wanted[position - len(self._real)].ravel()
         return np.asarray(pixels[wanted[pixels]])
 
-    def _codes(self, camera: Camera, places: NDArray[np.floating]) -> tuple[NDArray[np.uint16], Array]:
+    def _codes(
+        self, camera: Camera, places: NDArray[np.floating], pose: Similarity | None
+    ) -> tuple[NDArray[np.uint16], Array]:
         """(R, N, 2) of rays through places (R, 2), and their directions (R, 3)."""
         origins, directions = camera.rays(places.astype(np.float64))
         offsets, directions = np.ascontiguousarray(origins - self._centre), np.ascontiguousarray(directions)
-        distance = self._trace(offsets, directions)
-        return texture_positions(offsets, directions, distance, self._window, self._belt), directions
+        bend = self._bend(pose)
+        distance = self._trace(offsets, directions, bend)
+        return texture_positions(offsets, directions, distance, self._window, self._belt, bend), directions
+
+    def _pose(self, position: int, frame: int) -> Similarity | None:
+        """In which a camera sees the head turned over the torso; virtual ones see the layers as they were made."""
+        poses = self._scene.poses
+        return None if poses is None or position >= len(self._real) else poses.at(frame)
 
     def _camera(self, position: int, frame: int) -> Camera:
         if position < len(self._real):

@@ -53,11 +53,12 @@ export class Hotspots {
     for (const { child, holder, spot } of this.shown) {
       holder.hidden = !spot;
       if (!spot) continue;
-      const [x, y] = projected(matrix, spot.point);
+      const point = renderer.placed(spot.point);
+      const [x, y] = projected(matrix, point);
       const left = (0.5 + x / 2) * canvas.clientWidth;
       const top = (0.5 - y / 2) * canvas.clientHeight;
       holder.style.transform = `translate(${left}px, ${top}px) translate(-50%, -50%)`;
-      const towards = spot.normal.reduce((sum, n, i) => sum + n * (eye[i] - spot.point[i]), 0);
+      const towards = spot.normal.reduce((sum, n, i) => sum + n * (eye[i] - point[i]), 0);
       child.toggleAttribute("data-visible", towards > 0);
     }
   }
