@@ -89,9 +89,10 @@ def opacity_before(
     opacity, unknown = inside.astype(np.float32), unknown & ~inside
     colours, known = image.copy(), ~unknown
     away = np.ceil(np.asarray(ndimage.distance_transform_edt(~inside)))
+    subject = _Colours(colours, opacity, params)
     for distance in np.unique(away[unknown]):
         ring = np.nonzero(unknown & (away == distance))
-        mean, covariance = _nearby(colours, opacity**2 * known, ring, params)
+        mean, covariance = subject.around(ring)
         sure = known.astype(np.float32)
         beside = _blurred(opacity * sure, params.beside)[ring]
         beside /= np.maximum(_blurred(sure, params.beside)[ring], TINY)
@@ -99,6 +100,7 @@ def opacity_before(
         opacity[ring], colours[ring] = _likeliest(
             image[ring], plate[ring], mean, covariance, beside, variance[ring][:, None], params, believed
         )
+        subject.add(ring, colours[ring], opacity[ring])
         known[ring] = True
     return opacity
 
@@ -107,36 +109,55 @@ def _blurred(values: Array, width: float) -> Array:
     return np.asarray(cv2.GaussianBlur(values, (0, 0), width), np.float32)
 
 
-def _nearby(
-    colours: Array, weight: Array, ring: tuple[NDArray[np.int64], ...], params: PlateParams
-) -> tuple[Array, Array]:
-    """Mean (P, 3) and covariance (P, 3, 3) of the subject's colours around the ring's pixels."""
-    one, other = np.triu_indices(3)
-    first = np.empty((*weight.shape, 4), np.float32)
-    first[..., 0] = weight
-    np.multiply(colours, weight[..., None], out=first[..., 1:])
-    weighted = first[..., 1:]
-    # Four channels at a time: OpenCV resizes no more by what is not whole.
-    pairs = [(one[:4], other[:4]), (one[4:], other[4:])]
-    parts = [first, *(weighted[..., i] * colours[..., j] for i, j in pairs)]
-    wide = [_widely(part, params.spread) for part in parts]
-    if not (wide[0][..., 0][ring] > TINY).all():  # too far from the inside: as the nearest that is not
-        near = ndimage.distance_transform_edt(wide[0][..., 0] <= TINY, return_distances=False, return_indices=True)
-        wide = [part[tuple(near)] for part in wide]
-    here = np.concatenate([part[ring] for part in wide], -1)
-    mean = here[:, 1:4] / here[:, :1]
-    covariance = np.empty((len(here), 3, 3), np.float32)
-    covariance[:, one, other] = here[:, 4:] / here[:, :1] - mean[:, one] * mean[:, other]
-    covariance[:, other, one] = covariance[:, one, other]
-    return mean, covariance + params.deviation**2 * np.eye(3, dtype=np.float32)
+class _Colours:
+    """Mean and covariance of the subject's colours around pixels, as far as these are known: by a Gaussian blur at half
+    the size, where a wide one is the same.
+
+    Args:
+        colours: (H, W, 3).
+        opacity: (H, W), 0 where it is not known yet; a pixel counts by its square.
+    """
+
+    def __init__(self, colours: Array, opacity: Array, params: PlateParams) -> None:
+        self._params = params
+        self._sums = np.zeros(((opacity.shape[0] + 1) // 2, (opacity.shape[1] + 1) // 2, 10), np.float32)
+        there = np.nonzero(opacity)
+        self.add(there, colours[there], opacity[there])
+
+    def add(self, pixels: tuple[NDArray[np.int64], ...], colours: Array, opacity: Array) -> None:
+        """Pixels (P,), rows and columns, with their colours (P, 3) and opacity (P,)."""
+        one, other = np.triu_indices(3)
+        found = np.concatenate([np.ones_like(colours[:, :1]), colours, colours[:, one] * colours[:, other]], 1)
+        rows, columns = (part // 2 for part in pixels)
+        np.add.at(self._sums, (rows, columns), found * (0.25 * opacity[:, None] ** 2))
+
+    def around(self, pixels: tuple[NDArray[np.int64], ...]) -> tuple[Array, Array]:
+        """(P, 3) and (P, 3, 3)."""
+        one, other = np.triu_indices(3)
+        wide = _blurred(self._sums, self._params.spread / 2)
+        here = _between(wide, pixels)
+        if not (here[:, 0] > TINY).all():  # too far from what is known: as the nearest that is not
+            near = ndimage.distance_transform_edt(wide[..., 0] <= TINY, return_distances=False, return_indices=True)
+            here = _between(wide[tuple(near)], pixels)
+        mean = here[:, 1:4] / here[:, :1]
+        covariance = np.empty((len(here), 3, 3), np.float32)
+        covariance[:, one, other] = here[:, 4:] / here[:, :1] - mean[:, one] * mean[:, other]
+        covariance[:, other, one] = covariance[:, one, other]
+        return mean, covariance + self._params.deviation**2 * np.eye(3, dtype=np.float32)
 
 
-def _widely(values: Array, width: float) -> Array:
-    """(H, W, Q) blurred, Q at most 4: at half the size, where a wide blur is the same, and four times as fast."""
-    height, columns = values.shape[:2]
-    half = (max(1, columns // 2), max(1, height // 2))
-    small = _blurred(np.asarray(cv2.resize(values, half, interpolation=cv2.INTER_AREA)), width / 2)
-    return np.asarray(cv2.resize(small, (columns, height), interpolation=cv2.INTER_LINEAR))
+def _between(half: Array, pixels: tuple[NDArray[np.int64], ...]) -> Array:
+    """(P, Q): what an image of half the size (h, w, Q) has at pixels of the whole, bilinear, clamped."""
+    (i, di), (j, dj) = (_place(part, size) for part, size in zip(pixels, half.shape, strict=False))
+    low, right = np.minimum(i + 1, half.shape[0] - 1), np.minimum(j + 1, half.shape[1] - 1)
+    upper = half[i, j] * (1 - dj) + half[i, right] * dj
+    return np.asarray(upper * (1 - di) + (half[low, j] * (1 - dj) + half[low, right] * dj) * di)
+
+
+def _place(pixels: NDArray[np.int64], size: int) -> tuple[NDArray[np.int64], Array]:
+    place = np.clip(0.5 * pixels - 0.25, 0, size - 1).astype(np.float32)
+    first = place.astype(np.int64)
+    return first, (place - first)[:, None]
 
 
 def _likeliest(
