@@ -40,7 +40,7 @@ class Crossings:
     """Nearest crossing of R rays with N layers, outermost first.
 
     Attributes:
-        points: [R, N, 3]; where a layer is missed, the ray's origin.
+        points: [R, N, 3]; where a layer is missed, anything finite.
         distance: [R, N] along the ray; 0 where missed.
         hit: [R, N] bool.
     """

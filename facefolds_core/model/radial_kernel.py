@@ -41,8 +41,8 @@ def _look_up(rho, row, column, layer):  # type: ignore[no-untyped-def]
 
 
 BEND = 18
-"""Numbers of a bend (`turned.bend_of`): n, d and w of a torso, R by rows and t of its shift D, all about c, and how far
-anything goes."""
+"""Numbers of a bend (`RadialManifolds.bend`): n, d and w of a torso, R by rows and t of its shift D, all about c, and
+how far anything goes."""
 TRIES, EXACT = 8, 1e-6
 """Regula falsi's steps for the share of a point in a torso's band, and from which error on it is exact."""
 
@@ -60,6 +60,7 @@ def placed(x: Any, y: Any, z: Any, bend: Any) -> Any:
     if high >= 0.0:
         return hx, hy, hz
     a, b, ga, gb = 0.0, 1.0, low, high
+    side = 0
     for _ in range(TRIES):
         share = a + (b - a) * (ga / (ga - gb))
         hx, hy, hz = _straightened(x, y, z, share, bend)
@@ -68,10 +69,14 @@ def placed(x: Any, y: Any, z: Any, bend: Any) -> Any:
             break
         if off > 0.0:
             a, ga = share, off
-            gb *= 0.5  # Illinois: the stale end counts half
+            if side == 1:
+                gb *= 0.5  # Illinois: an end that is stale twice counts half
+            side = 1
         else:
             b, gb = share, off
-            ga *= 0.5
+            if side == -1:
+                ga *= 0.5
+            side = -1
     return hx, hy, hz
 
 
@@ -205,8 +210,9 @@ def crossing_distances(
     """(R, N) float32: distance of the nearest crossing with each layer; 0 where there is none.
 
     Marches with `step` between samples through the ball |x - c| < `bound` (its front half, where the window has no
-    more), and in strides of SKIP far above all layers. A crossing lies between neighbouring samples inside the window
-    at which the radius minus rho changes sign; it is refined by regula falsi.
+    more), and in strides of SKIP far above all layers; of what is bent through all of a larger ball, with `step` alone.
+    A crossing lies between neighbouring samples inside the window at which the radius minus rho changes sign; it is
+    refined by regula falsi.
     """
     result = np.zeros((offsets.shape[0], rho.shape[2]), np.float32)
     for ray in prange(offsets.shape[0]):
@@ -238,7 +244,7 @@ def cross(
     skip = SKIP
     if bend is not None:
         bound += bend[17]
-        skip = 0.5 * SKIP  # what is bent may be drawn together to half its length
+        skip = step  # what is bent may be drawn together to a part of its length
     disc = along * along - (ox * ox + oy * oy + oz * oz - bound * bound)
     if disc <= 0.0:
         return
@@ -310,6 +316,9 @@ def cross(
                             else:
                                 fb, gb = f, gm
                                 ga *= 0.5
+                        if bend is not None:  # noqa: SIM102  as above
+                            if abs(gm) > step:  # a fold's edge, no crossing
+                                continue
                         result[ray, n] = last + f * (s - last)
                         found += 1
                         found_whole += int(n < whole)

@@ -124,7 +124,8 @@ class Mattes:
             return self._plain(key, self._start)
         picture = self._frames.image(*key)
         assert self.body is not None
-        camera, colours, (start, behind) = self.scene.camera_in_head(*key), self._colours, self._seen(key)
+        with self._drawing:  # from Python 3.12 on cached properties have no lock
+            camera, colours, (start, behind) = self.scene.camera_in_head(*key), self._colours, self._seen(key)
         cut = cut_out(picture, start, camera, colours, self.edge)
         share = agreement(cut, start > 0.5)
         if share < self.edge.asked and self.alone is not None:
@@ -157,8 +158,7 @@ class Mattes:
         """Of the pictures of the body's frame, by the body as it was found."""
         assert self.body is not None
         body = self.body
-        with self._drawing:
-            return colours_of(_pictures(self.scene, body.splats, body.frame, body.subject), self.edge)
+        return colours_of(_pictures(self.scene, body.splats, body.frame, body.subject), self.edge)
 
     def _start(self, key: Key) -> Start | None:
         """What Gaussians say beside a plate, once they are known."""

@@ -98,7 +98,7 @@ def _soft(image: Image, plate: Image, subject: Image, params: PlateParams, start
         inside |= same & (grown((start.opacity < SOLID).astype(np.uint8), DEEP) == 0)
     unknown &= ~inside
     opacity: Array = inside.astype(np.float32)
-    if not unknown.any():
+    if not unknown.any() or not inside.any():
         return opacity
     part = around(inside | unknown, math.ceil(REACH * params.spread))
     colours, room = (one[part].astype(np.float32) / np.float32(255) for one in (image, plate))

@@ -29,7 +29,9 @@ class Log(Live):
         try:
             yield
         except OSError as error:
-            raise disk_error(error, self.dir) if is_disk_error(error) and error.filename is None else error from None
+            if is_disk_error(error) and error.filename is None:
+                raise disk_error(error, self.dir) from None
+            raise
 
 
 def open_log(folder: Path, resume: bool = False) -> Live:

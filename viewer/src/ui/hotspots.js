@@ -54,11 +54,12 @@ export class Hotspots {
       holder.hidden = !spot;
       if (!spot) continue;
       const point = renderer.placed(spot.point);
+      const tip = renderer.placed(spot.point.map((p, i) => p + spot.normal[i]));
       const [x, y] = projected(matrix, point);
       const left = (0.5 + x / 2) * canvas.clientWidth;
       const top = (0.5 - y / 2) * canvas.clientHeight;
       holder.style.transform = `translate(${left}px, ${top}px) translate(-50%, -50%)`;
-      const towards = spot.normal.reduce((sum, n, i) => sum + n * (eye[i] - point[i]), 0);
+      const towards = tip.reduce((sum, there, i) => sum + (there - point[i]) * (eye[i] - point[i]), 0);
       child.toggleAttribute("data-visible", towards > 0);
     }
   }
