@@ -115,8 +115,11 @@ class RadialManifolds(nn.Module):
         return Crossings(torch.from_numpy(points).to(origins) + self.centre, found, found > 0)
 
     def bend(self, pose: Similarity | None) -> np.ndarray | None:
-        """How the compiled search finds the layers where the head stands in a pose (head -> world): (BEND,), or None
-        without a torso."""
+        """How the compiled search finds layers while the head stands in a pose (head -> world); None without a torso.
+
+        Returns:
+            (18,) float64: n, d and w of the torso, R by rows and t of its shift D, all about c; how far anything goes.
+        """
         if self.torso is None or pose is None:
             return None
         centre, normal, shift = self.centre.cpu().double().numpy(), np.array(self.torso.normal), self.torso.shift(pose)

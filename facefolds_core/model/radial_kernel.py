@@ -40,9 +40,6 @@ def _look_up(rho, row, column, layer):  # type: ignore[no-untyped-def]
     return top * (1 - a) + bottom * a
 
 
-BEND = 18
-"""Numbers of a bend (`RadialManifolds.bend`): n, d and w of a torso, R by rows and t of its shift D, all about c, and
-how far anything goes."""
 TRIES, EXACT = 8, 1e-6
 """Regula falsi's steps for the share of a point in a torso's band, and from which error on it is exact."""
 
@@ -205,7 +202,7 @@ def crossing_distances(
     whole: int,  # layers that have no holes; they come first
     bound: float,
     step: float,
-    bend: Array | None,  # (BEND,), or None where all layers are as they were made
+    bend: Array | None,  # (18,) of `RadialManifolds.bend`, or None where all layers are as they were made
 ) -> Array:
     """(R, N) float32: distance of the nearest crossing with each layer; 0 where there is none.
 

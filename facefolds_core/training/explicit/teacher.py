@@ -116,9 +116,8 @@ class Teacher:
                 shown = in_part(self._splats, *self._turned(self._first))  # of a part of a take the pose is another
                 self._usual = mean_errors(shown, targets_of(self._real(self._first), photos(self._first)))
             targets = targets_of(self._real(frame), photos(frame))
-            begun = self.moved(frame) or self._splats
-            stays, shift = self._turned(frame)
-            turned = in_part(begun, stays, shift)
+            moved, (stays, shift) = self.moved(frame), self._turned(frame)
+            turned = in_part(self._splats if moved is None else moved, stays, shift)
             changed = changed_to(turned, self._usual, targets, self._seed + frame)
             self._known[frame] = in_part(changed, stays, shift.inverse())
         return self._known[frame]
