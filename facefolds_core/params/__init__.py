@@ -21,7 +21,6 @@ from facefolds_core.params.explicit import (
     ExplicitParams,
     FollowParams,
     GridTextureParams,
-    MovingParams,
 )
 from facefolds_core.params.export import (
     BakeParams,
@@ -60,7 +59,6 @@ __all__ = [
     "LevelParams",
     "MeshCodec",
     "MlpParams",
-    "MovingParams",
     "NormalizeParams",
     "Overrides",
     "Preset",

@@ -59,14 +59,6 @@ class FollowParams(Section):
     """Adam's, of colours; logits of alpha move faster, as in the training."""
 
 
-class MovingParams(Section):
-    """What a head that turns (`normalize.stabilize`) needs beside: its rays meet other texels in each frame."""
-
-    cache_megabytes: Annotated[int, Field(ge=0, le=1_000_000)] = 3072
-    """Memory for the crossings of all frames' rays, MB; what does not fit is traced anew each time, which can take ten
-    times as long as the rest."""
-
-
 class ExplicitParams(Section):
     """Model `explicit`: nested radius maps with texel grids. Its defaults are the preset `fast`."""
 
@@ -101,9 +93,6 @@ class ExplicitParams(Section):
 
     reflection: ReflectionParams = ReflectionParams()
     """What gloss adds, by the direction."""
-
-    moving: MovingParams = MovingParams()
-    """Of a head that turns."""
 
     segments: SegmentParams = SegmentParams()
     """Of takes that are too long to be trained at once."""

@@ -1,4 +1,4 @@
-"""Keys of version 0.1 that are no more, and what took their place: the remedy of the message that refuses them."""
+"""Keys that are no more, and what took their place: the remedy of the message that refuses them."""
 
 from __future__ import annotations
 
@@ -24,6 +24,7 @@ GONE: dict[str, str] = {
     "train.lambda_veil": CUT_OUT,
     "train.lambda_solid": CUT_OUT,
     "train.lr_volume": "the stage `subject` fits Gaussians; its section `subject` has keys of its own",
+    "train.moving": "traced rays are kept as long as the machine has memory to spare",
     "reconstruct.point_weight": FIXED,
     "reconstruct.trim": FIXED,
     "bake.iterations": "textures fitted to the meshes were no better than the model's own",
@@ -36,7 +37,7 @@ GONE: dict[str, str] = {
 
 
 def remedy_for(path: str) -> str | None:
-    """What to do about a key that is no more: "train.lr_texture"; None if version 0.1 had none of this name."""
+    """What to do about a key that is no more: "train.lr_texture"; None if there was none of this name."""
     if path in RENAMED:
         inner = RENAMED[path].partition(".")[2]
         return f"it is called `{inner}` now: write `{_yaml(inner)}`"

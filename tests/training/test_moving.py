@@ -12,7 +12,6 @@ from facefolds_core.captures.scene import Scene
 from facefolds_core.geometry.chart import Chart
 from facefolds_core.geometry.track import Track
 from facefolds_core.model.radial import RadialManifolds
-from facefolds_core.params import MovingParams
 from facefolds_core.training.explicit.views import MovingRays, Sampling, first_pixel, trace_views
 from facefolds_core.training.rays import RaySampler
 from tests.geometry.test_track import about
@@ -33,9 +32,9 @@ def layers() -> RadialManifolds:
     return RadialManifolds(Chart((float(CENTRE[0]), 0.0, 0.0)), (-0.6, 0.6, -0.6, 0.6), middle, halfwidth, 3)
 
 
-def rays(scene: Scene, stride: int = 1, share: float = 400.0, **keys: int) -> MovingRays:
-    sampling = Sampling(shares=keys.pop("shares", 1000), sample=keys.pop("sample", 1))
-    return MovingRays(scene, layers(), stride, share, MovingParams(**keys), sampling=sampling)
+def rays(scene: Scene, stride: int = 1, share: float = 400.0, reserve: float = 0.0, **keys: int) -> MovingRays:
+    sampling = Sampling(shares=keys.get("shares", 1000), sample=keys.get("sample", 1))
+    return MovingRays(scene, layers(), stride, share, sampling=sampling, reserve=reserve)
 
 
 def seen(found: MovingRays, frame: int, parts: int) -> dict[tuple[int, int], tuple[int, ...]]:
@@ -83,7 +82,7 @@ def test_each_frame_has_the_rays_of_its_own_cameras(scene: Scene) -> None:
 
 def test_what_does_not_fit_is_traced_anew_and_is_the_same(scene: Scene) -> None:
     turned = replace(scene, poses=TURNED)
-    kept, anew = rays(turned), rays(turned, cache_megabytes=0)
+    kept, anew = rays(turned), rays(turned, reserve=1.0)
     assert kept.part(1, 0, kept.shares)[0] is kept.part(1, 0, kept.shares)[0]
     assert anew.part(1, 0, anew.shares)[0] is not anew.part(1, 0, anew.shares)[0]
     assert seen(kept, 1, kept.shares) == seen(anew, 1, anew.shares)

@@ -134,9 +134,7 @@ class Trainer:
         finest = level.texels if level.stride > 1 else self.fit.texels
         share = self.params.textures.rays_per_texel * finest[0] * finest[1]
         self.geometry, self.stride = level.geometry, level.stride
-        self.views = rays_of(
-            self.scene, self.manifolds(), level.stride, share, self.params.moving, self.teacher.virtual
-        )
+        self.views = rays_of(self.scene, self.manifolds(), level.stride, share, self.teacher.virtual)
 
     def _new_state(self, texels: tuple[int, int]) -> TextureState:
         start = torch.from_numpy(self.fit.rgb).float()

@@ -95,7 +95,7 @@ def processes_for(scene: Scene, params: ExplicitParams, texels: int, segments: i
 def process_bytes(scene: Scene, params: ExplicitParams, texels: int) -> float:
     """Memory of one of the processes that fit segments; a still head's rays are the parent's, mapped."""
     rays = len(scene.indices("train")) * scene.width * scene.height
-    moving = 0 if scene.poses is None else params.moving.cache_megabytes << 20
+    moving = 0 if scene.poses is None else rays * _ray_bytes(params)
     cut_outs_and_pictures = rays * (4 + 3)
     return texels * _frame_bytes(params) + cut_outs_and_pictures + moving + FLOOR_BYTES
 

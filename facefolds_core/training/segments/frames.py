@@ -136,7 +136,7 @@ class FrameFitter:
         share = self.params.textures.rays_per_texel * h * w
         alone = part_of(self.scene, [frame])
         first = int(random.integers(1 << 30))
-        return MovingRays(alone, self.base.manifolds, 1, share, self.params.moving, first)
+        return MovingRays(alone, self.base.manifolds, 1, share, first)
 
     def _rates(self, progress: float) -> NDArray[np.float32]:
         rates = rates_of(self.params.textures.learning_rate * falling(progress))
