@@ -100,11 +100,7 @@ def write_glb(path: Path, level: AssetLevel, name: str, frame: int = 0) -> None:
             found=frame,
             remedy="correct it in params.yaml",
         )
-    if level.track is not None:
-        posed = (level.track.posed(one.vertices, frame).astype(np.float32) for one in level.layers)
-        level = replace(
-            level, layers=tuple(replace(one, vertices=v) for one, v in zip(level.layers, posed, strict=True))
-        )
+    level = posed(level, frame)
     textures = opaque_where_covered(level.frame(frame), level.windows)
     builder = Builder()
     primitives = _primitives(builder, level, triangles_of(level, textures))
@@ -122,6 +118,15 @@ def write_glb(path: Path, level: AssetLevel, name: str, frame: int = 0) -> None:
         textures=[{"source": 0, "sampler": 0}],
         images=[{"name": "layers", "mimeType": "image/png", "bufferView": picture}],
     )
+
+
+def posed(level: AssetLevel, frame: int) -> AssetLevel:
+    """The layers as they stand over a torso in a frame, in the head's own frame."""
+    track = level.track
+    if track is None or track.torso is None:
+        return level
+    moved = (replace(one, vertices=track.posed(one.vertices, frame).astype(np.float32)) for one in level.layers)
+    return replace(level, layers=tuple(moved))
 
 
 def write_document(path: Path, name: str, builder: Builder, nodes: Sequence[dict[str, Any]], **parts: Any) -> int:

@@ -87,6 +87,15 @@ class Face:
             found[channel["target"]["path"]] = values[frame].astype(float)
         return found
 
+    def _staying(self, x: Array, frame: int) -> Array:
+        """Vertices (V, 3) of the layers, some of which stay while the node moves, in the node's own axes."""
+        if "torso" not in self.said:
+            return x
+        one = self.said["torso"]
+        share = np.clip((x @ one["normal"] - one["offset"]) / one["band"], 0, 1)[:, None]
+        matrix = np.linalg.inv(placed(self._pose(frame))) @ placed(one)
+        return x + share * (x @ matrix[:3, :3].T + matrix[:3, 3] - x)
+
     def render(self, eye: Array, rays: Array, frame: int, background: float, picture: Array) -> Array:
         """Colors (M, 3) along unit rays (M, 3) from an eye, both in the scene's axes, of one of `pictures`."""
         inward = np.linalg.inv(self.to_gltf(frame))
@@ -94,7 +103,7 @@ class Face:
         color, through = np.zeros((len(rays), 3)), np.ones(len(rays))
         (X, Y, _, _), (A, B, _, _) = self.said["colorRectangle"], self.said["alphaRectangle"]
         for layer, (mesh, (x, y, w, h)) in enumerate(zip(self.meshes, self.said["rectangles"], strict=True)):
-            hit, st = nearest(eye, rays, *mesh)
+            hit, st = nearest(eye, rays, self._staying(mesh[0], frame), *mesh[1:])
             own = bilinear(picture[Y + y : Y + y + h, X + x : X + x + w], st)
             alpha = bilinear(picture[B + y : B + y + h, A + x : A + x + w], st)[:, 0]
             if "reflection" in self.said:

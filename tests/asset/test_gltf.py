@@ -14,6 +14,7 @@ import DracoPy
 import jsonschema
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 
 from facefolds_core.asset import read_asset
 from facefolds_core.asset.audio import AAC_MIME, encode_sound
@@ -22,7 +23,7 @@ from facefolds_core.asset.gltf.extension import NAME, SCHEMA, LayeredVideo, sche
 from facefolds_core.asset.gltf.writing import write_layered
 from facefolds_core.cli.export import export
 from facefolds_core.params import CompressParams, MeshCodec
-from tests.assets import TRACK
+from tests.assets import OVER_TORSO, TORSO, TRACK
 from tests.gltf_files import complaints, opened, part, validator_report
 from tests.viewer.fixtures import change_manifest, file_entry, moving_asset
 
@@ -32,9 +33,9 @@ FRAMES = 3
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """An asset with all that the extension says: a track and a reflection."""
+    """An asset with all that the extension says: a track over a torso, and a reflection."""
     params = CompressParams(mesh=MeshCodec(quantization_bits=14, compression_level=7))
-    return moving_asset(tmp_path_factory.mktemp("gltf") / "asset", params=params).folder
+    return moving_asset(tmp_path_factory.mktemp("gltf") / "asset", OVER_TORSO, params=params).folder
 
 
 @pytest.fixture(scope="module")
@@ -129,6 +130,21 @@ def test_the_animation_is_the_track(written: tuple[dict[str, Any], bytes]) -> No
         np.testing.assert_allclose(values.reshape(FRAMES, -1), wanted.pop(path), atol=1e-6)
         np.testing.assert_allclose(document["nodes"][0][path], values.reshape(FRAMES, -1)[1], atol=1e-6)
     assert not wanted
+
+
+def test_the_still_stands_over_its_torso(folder: Path, tmp_path: Path) -> None:
+    level = read_asset(folder).full
+    write_layered(tmp_path / "face.glb", level, "caps", still=2)
+    document, binary = opened(tmp_path / "face.glb")
+    track, one = level.track, said(document)["torso"]
+    assert track is not None and track.torso is not None
+    assert one["rotation"] == pytest.approx([*TORSO.quaternion[1:], TORSO.quaternion[0]])
+    primitive = document["meshes"][0]["primitives"][0]
+    view = document["accessors"][primitive["attributes"]["POSITION"]]["bufferView"]
+    vertices = np.frombuffer(part(document, binary, view), "<f4").reshape(-1, 3)
+    made = np.concatenate([layer.vertices for layer in level.layers])
+    off = [cKDTree(places).query(vertices)[0].max() for places in (track.posed(made, 2), made)]
+    assert off[0] < 1e-6 < 0.01 < off[1]
 
 
 def test_the_command_writes_it(folder: Path, tmp_path: Path) -> None:

@@ -18,6 +18,7 @@ from facefolds_core.asset.gltf.checking import check_glb
 from facefolds_core.asset.gltf.extension import NAME, TEXTURE_VIDEO
 from facefolds_core.asset.gltf.writing import write_layered
 from facefolds_core.cli import app
+from tests.assets import OVER_TORSO
 from tests.gltf_files import opened
 from tests.hostile.damage import MUTATIONS
 from tests.hostile.structured import damage_values
@@ -29,7 +30,7 @@ PLACE = re.compile(r"^(/.*|byte \d+): .+")
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    asset = moving_asset(tmp_path_factory.mktemp("whole") / "asset", layers=2, resolution=32)
+    asset = moving_asset(tmp_path_factory.mktemp("whole") / "asset", OVER_TORSO, layers=2, resolution=32)
     write_layered(asset.folder.with_suffix(".glb"), asset.full, "caps")
     return asset.folder.with_suffix(".glb")
 
@@ -79,6 +80,14 @@ MISTAKES: dict[str, tuple[Callable[[Document], Any], str]] = {
     "no such part": (
         lambda d: layered(d)["checksums"][2].update(bufferView=10**4),
         f"/nodes/0/extensions/{NAME}/checksums/2/bufferView: there is no bufferViews[10000]",
+    ),
+    "a slanting torso": (
+        lambda d: layered(d)["torso"].update(normal=[1, 1, 0]),
+        f"/nodes/0/extensions/{NAME}/torso/normal: not of unit length",
+    ),
+    "nothing to stay over": (
+        lambda d: layered(d).pop("animation"),
+        f"/nodes/0/extensions/{NAME}/torso: there is no animation",
     ),
     "maps beyond": (
         lambda d: layered(d)["reflection"].update(glossRectangle=[0, 0, 4000, 1]),

@@ -9,6 +9,7 @@ from facefolds_core.asset import Asset
 from facefolds_core.asset.gltf.writing import write_layered
 from facefolds_core.rendering.pixels import render
 from tests.asset.independent_gltf_reader import Face
+from tests.assets import MOVING, OVER_TORSO
 from tests.pictures import GREY_VALUE, five_cameras, psnr
 from tests.viewer.fixtures import moving_asset
 
@@ -19,9 +20,9 @@ AGREE = 45.0
 """dB, of means over pixels."""
 
 
-@pytest.fixture(scope="module")
-def asset(tmp_path_factory: pytest.TempPathFactory) -> Asset:
-    made = moving_asset(tmp_path_factory.mktemp("face") / "asset", layers=3)
+@pytest.fixture(scope="module", params=[MOVING, OVER_TORSO], ids=["whole", "over a torso"])
+def asset(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Asset:
+    made = moving_asset(tmp_path_factory.mktemp("face") / "asset", request.param, layers=3)
     write_layered(made.folder.with_suffix(".glb"), made.full, "caps")
     return made
 

@@ -18,6 +18,7 @@ from facefolds_core.asset import Asset, read_asset
 from facefolds_core.asset.manifest import Manifest, Reflection
 from facefolds_core.asset.manifest_file import parse_manifest, write_manifest
 from facefolds_core.asset.reflection import pack_reflection
+from facefolds_core.asset.writer import AssetSource
 from facefolds_core.geometry.reflections import ReflectionMaps
 from facefolds_core.params import CompressParams, VideoCodec
 from tests.assets import MOVING, make_asset
@@ -101,9 +102,10 @@ def add_reflection(folder: Path) -> None:
     change_manifest(folder, lambda value: value["levels"][-1].update(reflection=entry))
 
 
-def moving_asset(folder: Path, **options: Any) -> Asset:
-    """Three frames of a head that moves in the light of its room: all that the extension of glTF says."""
-    make_asset(folder, frames=3, source=MOVING, **options)
+def moving_asset(folder: Path, source: AssetSource = MOVING, **options: Any) -> Asset:
+    """Three frames of a head that moves in the light of its room; over a torso it is all that the extension of glTF
+    says."""
+    make_asset(folder, frames=3, source=source, **options)
     add_reflection(folder)
     return read_asset(folder)
 

@@ -18,7 +18,7 @@ from facefolds_core.asset.gltf.writing import write_layered
 from facefolds_core.cli.export import export
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.rendering.pixels import render
-from tests.assets import make_asset
+from tests.assets import MOVING, OVER_TORSO, make_asset
 from tests.gltf_files import opened
 from tests.pictures import GREY_VALUE, expected_means, five_cameras, psnr
 from tests.viewer.fixtures import moving_asset
@@ -45,10 +45,10 @@ def face(tmp_path_factory: pytest.TempPathFactory) -> tuple[Asset, Path]:
     return asset, exported(asset)
 
 
-@pytest.fixture(scope="module")
-def moving(tmp_path_factory: pytest.TempPathFactory) -> tuple[Asset, Path]:
+@pytest.fixture(scope="module", params=[MOVING, OVER_TORSO], ids=["whole", "over a torso"])
+def moving(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple[Asset, Path]:
     """Of a head that moves in the light of its room."""
-    asset = moving_asset(tmp_path_factory.mktemp("moving") / "asset", layers=4, resolution=96)
+    asset = moving_asset(tmp_path_factory.mktemp("moving") / "asset", request.param, layers=4, resolution=96)
     return asset, exported(asset)
 
 

@@ -15,9 +15,9 @@ import { Constants } from "@babylonjs/core/Engines/constants.js";
 import { AnimationGroup } from "@babylonjs/core/Animations/animationGroup.js";
 import { HtmlElementTexture } from "@babylonjs/core/Materials/Textures/htmlElementTexture.js";
 import { ShaderMaterial } from "@babylonjs/core/Materials/shaderMaterial.js";
-import { Quaternion, Vector2, Vector3, Vector4 } from "@babylonjs/core/Maths/math.vector.js";
+import { Matrix, Quaternion, Vector2, Vector3, Vector4 } from "@babylonjs/core/Maths/math.vector.js";
 import { registerGLTFExtension } from "@babylonjs/loaders/glTF/2.0/glTFLoaderExtensionRegistry.js";
-import { LAYER, NAME, check, depths, follow, openVideo, released, seek, slice } from "./video.js";
+import { LAYER, NAME, STAYING, check, depths, follow, openVideo, released, seek, slice } from "./video.js";
 
 const vertexSource = `
 precision highp float;
@@ -29,10 +29,11 @@ uniform mat4 viewProjection;
 uniform vec2 depth; // of z and w: into the layer's slice
 varying vec2 st;
 varying vec3 point;
+${STAYING}
 void main() {
   st = uv;
-  point = position;
-  gl_Position = viewProjection * (world * vec4(position, 1.0));
+  point = staying(position);
+  gl_Position = viewProjection * (world * vec4(point, 1.0));
   gl_Position.z = depth.x * gl_Position.z + depth.y * gl_Position.w;
 }`;
 const fragmentSource = `
@@ -118,6 +119,7 @@ class LayeredVolumetricVideo {
 class LayeredVideo {
   constructor(scene, node, meshes, said, video, maps, track) {
     Object.assign(this, { scene, node, meshes, said, video, maps, track, frame: 0 });
+    this.strays = 0; // how far what stays may be from where the node takes it
     this.rate = said.frameRate[0] / said.frameRate[1];
     this.picture = new HtmlElementTexture(NAME, video, { scene });
     meshes.forEach((mesh, layer) => this.dress(mesh, layer));
@@ -138,11 +140,26 @@ class LayeredVideo {
     const { rotation, translation } = this.track;
     if (rotation) this.node.rotationQuaternion = Quaternion.FromArray(rotation, 4 * frame);
     if (translation) this.node.position = Vector3.FromArray(translation, 3 * frame);
+    if (this.said.torso) this.stand();
+  }
+
+  /** Where what stays is, in the node's own axes. */
+  stand() {
+    const { rotation, translation } = this.said.torso;
+    const { rotationQuaternion, position } = this.node;
+    const own = Quaternion.FromArray(rotation);
+    const rest = Matrix.Compose(Vector3.One(), own, Vector3.FromArray(translation));
+    const now = Matrix.Compose(Vector3.One(), rotationQuaternion ?? Quaternion.Identity(), position);
+    const stay = rest.multiply(now.invert()); // rows: the first is applied first
+    const { center, radius } = this.meshes[0].getBoundingInfo().boundingSphere;
+    const turn = 2 * Math.acos(Math.min(1, Math.abs(Quaternion.Dot(own, rotationQuaternion ?? Quaternion.Identity()))));
+    this.strays = Vector3.Distance(Vector3.TransformCoordinates(center, stay), center) + 2 * radius * Math.sin(turn / 2);
+    for (const { material } of this.meshes) material.setMatrix("stay", stay);
   }
 
   dress(mesh, layer) {
     const { said, maps } = this;
-    const uniforms = ["world", "viewProjection", "depth", "size", "rectangle", "origins"];
+    const uniforms = ["world", "viewProjection", "depth", "size", "rectangle", "origins", "torso", "band", "stay"];
     const gloss = ["mapsSize", "environment", "gloss", "offset", "normals", "scales", "toMaps", "eye", "turn"];
     const material = new ShaderMaterial(
       `layer ${layer}`,
@@ -164,6 +181,9 @@ class LayeredVideo {
     material.setVector4("rectangle", new Vector4(...said.rectangles[layer]));
     const [[x, y], [ax, ay]] = [said.colorRectangle, said.alphaRectangle];
     material.setVector4("origins", new Vector4(x, y, ax, ay));
+    const { normal = [0, 0, 0], offset = 0, band = 0 } = said.torso ?? {};
+    material.setVector4("torso", new Vector4(...normal, offset)).setFloat("band", band);
+    material.setMatrix("stay", Matrix.Identity());
     if (maps) this.polish(material, layer);
     mesh.material = material;
     mesh.alphaIndex = this.meshes.length - layer; // the innermost is drawn first
@@ -184,7 +204,8 @@ class LayeredVideo {
   prepare(camera) {
     const spheres = this.meshes.map((mesh) => mesh.getBoundingInfo().boundingSphere);
     const centre = spheres[0].centerWorld;
-    const reach = Math.max(...spheres.map((one) => Vector3.Distance(one.centerWorld, centre) + one.radiusWorld));
+    const far = spheres.map((one) => Vector3.Distance(one.centerWorld, centre) + one.radiusWorld);
+    const reach = Math.max(...far) + this.strays;
     const along = this.scene.useRightHandedSystem ? -1 : 1;
     const distance = along * Vector3.TransformCoordinates(centre, camera.getViewMatrix()).z;
     const range = depths(camera.getProjectionMatrix().m, distance, reach, along);

@@ -14,17 +14,18 @@
  */
 import * as THREE from "three";
 import { mergeGeometries } from "three/addons/utils/BufferGeometryUtils.js";
-import { LAYER, NAME, check, depths, follow, openVideo, released, seek, slice } from "./video.js";
+import { LAYER, NAME, STAYING, check, depths, follow, openVideo, released, seek, slice } from "./video.js";
 
 const VERTEX = `
 invariant gl_Position;
 uniform vec2 depth; // of z and w: into the layer's slice
 out vec2 st;
 out vec3 point;
+${STAYING}
 void main() {
   st = uv;
-  point = position;
-  gl_Position = projectionMatrix * (modelViewMatrix * vec4(position, 1.0));
+  point = staying(position);
+  gl_Position = projectionMatrix * (modelViewMatrix * vec4(point, 1.0));
   gl_Position.z = depth.x * gl_Position.z + depth.y * gl_Position.w;
 }`;
 
@@ -91,6 +92,8 @@ export class LayeredVideoMesh extends THREE.Mesh {
     picture.colorSpace = THREE.NoColorSpace; // stored values
     super(...assembled(said, geometries, picture, maps));
     Object.assign(this, { said, video, picture, track, frame: 0 });
+    this.stay = new THREE.Matrix4();
+    this.strays = 0; // how far what stays may be from where the node takes it
     this.rate = said.frameRate[0] / said.frameRate[1];
     this.geometry.computeBoundingSphere();
     follow(video, this.rate, said.frames, (frame) => this.pose(frame));
@@ -109,18 +112,36 @@ export class LayeredVideoMesh extends THREE.Mesh {
     const { rotation, translation } = this.track;
     if (rotation) this.quaternion.fromArray(rotation, 4 * frame);
     if (translation) this.position.fromArray(translation, 3 * frame);
+    if (this.said.torso) this.stand();
+  }
+
+  /** Where what stays is, in the node's own axes. */
+  stand() {
+    const { rotation, translation } = this.said.torso;
+    const { center, radius } = this.geometry.boundingSphere;
+    const one = new THREE.Vector3(1, 1, 1);
+    const rest = new THREE.Matrix4().compose(
+      new THREE.Vector3(...translation),
+      new THREE.Quaternion(...rotation),
+      one,
+    );
+    const now = new THREE.Matrix4().compose(this.position, this.quaternion, one);
+    this.stay.copy(now.invert().multiply(rest));
+    const turn = this.quaternion.angleTo(new THREE.Quaternion(...rotation));
+    this.strays = center.clone().applyMatrix4(this.stay).distanceTo(center) + 2 * radius * Math.sin(turn / 2);
   }
 
   onBeforeRender(renderer, scene, camera, geometry, material) {
     const { center, radius } = geometry.boundingSphere;
     const seen = center.clone().applyMatrix4(this.matrixWorld).applyMatrix4(camera.matrixWorldInverse);
-    const reach = radius * this.matrixWorld.getMaxScaleOnAxis();
+    const reach = (radius + this.strays) * this.matrixWorld.getMaxScaleOnAxis();
     const { uniforms, layer } = material;
     uniforms.depth.value = slice(
       layer,
       this.said.rectangles.length,
       ...depths(camera.projectionMatrix.elements, -seen.z, reach),
     );
+    if (this.said.torso) uniforms.stay.value = this.stay;
     if (uniforms.eye) {
       uniforms.eye.value.setFromMatrixPosition(camera.matrixWorld).applyMatrix4(this.matrixWorld.clone().invert());
       if (this.said.animation !== undefined) uniforms.turn.value = this.quaternion;
@@ -161,7 +182,8 @@ function assembled(said, geometries, picture, maps) {
 }
 
 function materialOf(said, layer, pass, picture, maps) {
-  const uniforms = { depth: [1, 0] };
+  const { normal = [0, 0, 0], offset = 0, band = 0 } = said.torso ?? {};
+  const uniforms = { depth: [1, 0], torso: [...normal, offset], band, stay: new THREE.Matrix4() };
   const coloured = pass.colorWrite !== false;
   if (coloured) {
     const [color, alpha] = [said.colorRectangle, said.alphaRectangle];

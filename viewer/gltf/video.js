@@ -87,6 +87,16 @@ export async function seek(video, rate, frame) {
   await there;
 }
 
+/** Of a vertex shader: what stays in the room while the node turns, in the node's own axes. */
+export const STAYING = `
+uniform vec4 torso; // normal and offset of the plane from which on vertices begin to stay
+uniform float band; // within which they come to stay, 0 where nothing does
+uniform mat4 stay; // where those that stay are
+vec3 staying(vec3 p) {
+  if (band <= 0.0) return p;
+  return mix(p, (stay * vec4(p, 1.0)).xyz, clamp((dot(torso.xyz, p) - torso.w) / band, 0.0, 1.0));
+}`;
+
 /**
  * (a, b): a z + b w, in clip coordinates, brings layer `i` of `n` into its slice of the depths that the subject takes.
  * @param {number} near depth of the subject's nearest point, in normalised device coordinates

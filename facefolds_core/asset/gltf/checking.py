@@ -96,6 +96,7 @@ def _node_problems(glb: Glb, index: int) -> list[str]:
         _layout_problems,
         _layer_problems,
         _motion_problems,
+        _torso_problems,
         _reflection_problems,
         _video_problems,
     ):
@@ -231,6 +232,18 @@ def _motion_problems(glb: Glb, said: LayeredVideo, place: str, node: int) -> Ite
             yield f"{at}/output: quaternions that are not of unit length"
     if len(set(paths)) != len(paths) or not paths:
         yield f"/animations/{said.animation}/channels: none, or two for one path"
+
+
+def _torso_problems(glb: Glb, said: LayeredVideo, place: str, _: int) -> Iterator[str]:
+    """What stays while the node moves."""
+    one = said.torso
+    if one is None:
+        return
+    if said.animation is None:
+        yield f"{place}/torso: there is no animation over which it would stay"
+    for name, values in (("normal", one.normal), ("rotation", one.rotation)):
+        if not abs(np.linalg.norm(values) - 1) <= UNIT:
+            yield f"{place}/torso/{name}: not of unit length"
 
 
 def _reflection_problems(glb: Glb, said: LayeredVideo, place: str, _: int) -> Iterator[str]:

@@ -12,7 +12,18 @@ from typing import Annotated, Any
 from pydantic import ConfigDict, Field
 from pydantic.alias_generators import to_camel
 
-from facefolds_core.asset.manifest_base import Count, Maybe, Part, RateTerm, Rect, Row, Scale, Sha256, without_absent
+from facefolds_core.asset.manifest_base import (
+    Count,
+    Maybe,
+    Part,
+    RateTerm,
+    Rect,
+    Row,
+    Scale,
+    Sha256,
+    Vector,
+    without_absent,
+)
 from facefolds_core.files.writing import write_json
 
 NAME = "EXT_layered_volumetric_video"
@@ -60,6 +71,24 @@ class Reflection(GltfPart):
         return {to_camel(name): getattr(self, name) for name in names}
 
 
+class Torso(GltfPart):
+    """What stays while the animation moves the node: all beyond a plane, as shoulders do. A reader may ignore it.
+
+    Attributes:
+        normal: of the plane, of unit length, towards what stays; in the node's own axes.
+        offset: along the normal, where vertices begin to stay.
+        band: behind the plane, within which they come to stay.
+        rotation: of the node in the pose in which they stay, x, y, z, w.
+        translation: of the node in that pose.
+    """
+
+    normal: Vector
+    offset: float
+    band: Scale
+    rotation: tuple[float, float, float, float]
+    translation: Vector
+
+
 class Checksum(GltfPart):
     """What a part of the file must be.
 
@@ -87,6 +116,7 @@ class LayeredVideo(GltfPart):
         frame_rate: numerator and denominator of the pictures a second.
         still_frame: the frame that the node's own mesh shows.
         animation: index of the animation that moves the node with the video.
+        torso: what stays meanwhile.
         reflection: gloss.
         checksums: of buffer views of this file.
     """
@@ -102,6 +132,7 @@ class LayeredVideo(GltfPart):
     frame_rate: tuple[RateTerm, RateTerm]
     still_frame: Annotated[int, Field(ge=0)] = 0
     animation: Maybe[Index] = None
+    torso: Maybe[Torso] = None
     reflection: Maybe[Reflection] = None
     checksums: Maybe[Annotated[tuple[Checksum, ...], Field(min_length=1)]] = None
 

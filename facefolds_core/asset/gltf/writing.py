@@ -29,10 +29,11 @@ from facefolds_core.asset.glb import (
     picture_of,
     png,
     pose_of,
+    posed,
     triangles_of,
     write_document,
 )
-from facefolds_core.asset.gltf.extension import DRACO, NAME, TEXTURE_VIDEO, Checksum, LayeredVideo, Reflection
+from facefolds_core.asset.gltf.extension import DRACO, NAME, TEXTURE_VIDEO, Checksum, LayeredVideo, Reflection, Torso
 from facefolds_core.asset.manifest import Video
 from facefolds_core.asset.manifest_base import StoredFile
 from facefolds_core.asset.manifest_extras import Audio
@@ -71,7 +72,7 @@ def write_layered(
         IndexError: if there is no such frame.
         UserError: if the asset is damaged.
     """
-    shown = level if fallback is None else fallback
+    shown = posed(level if fallback is None else fallback, still)
     textures = opaque_where_covered(shown.frame(still), shown.windows)
     builder = Builder()
     meshes = [_still(builder, triangles_of(shown, textures)), _layers(builder, level)]
@@ -156,6 +157,7 @@ def _said(level: AssetLevel, still: int) -> LayeredVideo:
         frame_rate=texture.frame_rate,
         still_frame=still,
         animation=None if level.track is None else 0,
+        torso=None if level.track is None else _torso(level.track),
         reflection=None
         if maps is None
         else Reflection(
@@ -169,6 +171,17 @@ def _said(level: AssetLevel, still: int) -> LayeredVideo:
             gloss_scale=maps.gloss_scale,
             offset_scale=maps.offset_scale,
         ),
+    )
+
+
+def _torso(track: Track) -> Torso | None:
+    """What stays while the animation moves the node."""
+    one = track.torso
+    if one is None:
+        return None
+    w, x, y, z = one.quaternion
+    return Torso(
+        normal=one.normal, offset=one.offset, band=one.band, rotation=(x, y, z, w), translation=one.translation
     )
 
 
