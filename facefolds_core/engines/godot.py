@@ -4,7 +4,8 @@ Godot 3 has no Draco (it loads garbage without an error), no MP4, and its player
 holds plain binary meshes with y up, and every frame as a picture of its own.
 
 `facefolds.json` names all files; rectangles are the asset's own ([x, y, width, height], pixels of the picture, y down).
-`track` (absent where the head stands still) has a pose a frame, in the asset's own axes, as the manifest has it.
+`track` (absent where the head stands still) has a pose a frame, in the asset's own axes, and `torso` is what stays
+meanwhile, as the manifest has them.
 A mesh file is little-endian: 3 V float32 positions, 2 V float32 texture coordinates (s, t), 3 T uint32 indices.
 """
 
@@ -16,6 +17,7 @@ from typing import Any
 
 from PIL import Image
 
+from facefolds_core.asset.manifest_extras import StandingTorso
 from facefolds_core.asset.reader import AssetLevel
 from facefolds_core.asset.stored import refuse_changed
 from facefolds_core.engines._folder import in_words, refuse_other_content, rgb_picture
@@ -74,6 +76,8 @@ def export(out: Path, level: AssetLevel, subject: str) -> str:
         if level.track is not None:
             poses = zip(level.track.quaternions.tolist(), level.track.translations.tolist(), strict=True)
             contents["track"] = [{"quaternion": q, "translation": t} for q, t in poses]
+            if level.track.torso is not None:
+                contents["torso"] = StandingTorso.of(level.track.torso).model_dump(mode="json")
         write_json(folder / CONTENTS, contents)
         return in_words(level, folder)
 

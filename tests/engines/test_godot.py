@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,8 @@ from PIL import Image
 
 from facefolds_core.asset import Asset, read_asset
 from facefolds_core.engines.godot import CONTENTS, export
+from facefolds_core.geometry.torso import Torso
+from facefolds_core.rendering import render_asset
 from tests.assets import make_asset
 from tests.engines.godot import errors, missing, pictures, run_godot, view_of
 from tests.engines.tracks import with_track
@@ -88,6 +91,18 @@ def test_a_head_that_moves_stands_where_it_stood_and_the_light_stays(caps: Asset
     export(tmp_path / "godot", level, "caps")
     found = pictures(tmp_path / "godot", [camera], (frame,), GREY_VALUE)[camera.name, frame]
     assert psnr(found, lit_picture(level, camera, frame)) >= AGREE
+
+
+@pytest.mark.usefixtures("_godot")
+def test_a_torso_stays_in_the_room(caps: Asset, tmp_path: Path) -> None:
+    level, camera, frame = with_track(caps.full, 40), five_cameras(SIZE)[1], 4
+    assert level.track is not None
+    torso = Torso.at([0.0, 0.0, -1.0], -0.05, 0.1, level.track.at(0))
+    over = replace(level, track=replace(level.track, torso=torso))
+    export(tmp_path / "godot", over, "caps")
+    found = pictures(tmp_path / "godot", [camera], (frame,), GREY_VALUE)[camera.name, frame]
+    expected = [render_asset(one, camera, frame, (GREY_VALUE,) * 3)[0] for one in (over, level)]
+    assert psnr(found, expected[0]) >= AGREE and psnr(expected[1], expected[0]) < 30
 
 
 @pytest.mark.usefixtures("_godot")

@@ -14,6 +14,9 @@ uniform float radius;
 uniform float slice;         // index of the layer, outermost 0
 uniform float slices;
 uniform bool depth_only;
+uniform vec4 torso;           // in the asset's own axes: normal and offset of the plane from which on points stay in the room
+uniform float band;           // within which they come to stay, 0 where nothing does
+uniform mat4 stay;            // where points that stay are, in these axes
 
 uniform sampler2D reflection;     // four small pictures; the rectangles are x, y, width, height
 uniform vec2 reflection_size;     // pixels; 0: there is none
@@ -35,6 +38,11 @@ float device_depth(mat4 projection, float z) {
 
 void vertex() {
 	point = VERTEX.zxy;
+	if (band > 0.0) {
+		float share = clamp((dot(torso.xyz, point) - torso.w) / band, 0.0, 1.0);
+		point = mix(point, (stay * vec4(point, 1.0)).xyz, share);
+		VERTEX = point.yzx;
+	}
 	eye = (inverse(MODELVIEW_MATRIX) * vec4(0.0, 0.0, 0.0, 1.0)).zxy;
 	vec4 clip = PROJECTION_MATRIX * (MODELVIEW_MATRIX * vec4(VERTEX, 1.0));
 	float middle = (MODELVIEW_MATRIX * vec4(centre, 1.0)).z;

@@ -25,6 +25,8 @@ var playing = false
 
 var _materials = []
 var _picture
+var _bounds_centre = Vector3()
+var _radius = 0.0
 var _clock = 0.0
 
 
@@ -98,10 +100,33 @@ func _place(number):
 	var q = pose.quaternion  # w, x, y, z, in the asset's axes: (x, y, z) is (y, z, x) here
 	var t = pose.translation
 	_set_all("to_room", Basis(Quat(q[1], q[2], q[3], q[0])))
+	if contents.has("torso"):
+		_let_stay(_transform(pose))
 	var placed = Transform(Basis(Quat(q[2], q[3], q[1], q[0])), Vector3(t[1], t[2], t[0]))
 	for layer in get_children():
 		if layer is MeshInstance:
 			layer.transform = Transform.IDENTITY if still else placed
+
+
+# A pose in the asset's own axes.
+func _transform(pose):
+	var q = pose.quaternion
+	var t = pose.translation
+	return Transform(Basis(Quat(q[1], q[2], q[3], q[0])), Vector3(t[0], t[1], t[2]))
+
+
+# What lies beyond the torso's plane stays in the room while the head stands in a pose.
+func _let_stay(pose):
+	var torso = contents.torso
+	var n = torso.normal
+	var stay = pose.inverse() * _transform(torso)
+	var centre = Vector3(_bounds_centre.z, _bounds_centre.x, _bounds_centre.y)
+	var w = Quat(stay.basis).w
+	var strays = (stay.xform(centre) - centre).length() + 2.0 * _radius * sqrt(max(0.0, 1.0 - w * w))
+	_set_all("torso", Plane(n[0], n[1], n[2], torso.offset))
+	_set_all("band", 0.0 if still else float(torso.band))
+	_set_all("stay", stay)
+	_set_all("radius", _radius + strays)
 
 
 func set_layer_visible(index, shown):
@@ -169,8 +194,10 @@ func _build_layers():
 		return problem
 	_set_all("slices", float(count))
 	_set_all("to_room", Basis())
-	_set_all("centre", bounds.position + bounds.size / 2)
-	_set_all("radius", bounds.size.length() / 2)
+	_bounds_centre = bounds.position + bounds.size / 2
+	_radius = bounds.size.length() / 2
+	_set_all("centre", _bounds_centre)
+	_set_all("radius", _radius)
 	return ""
 
 
