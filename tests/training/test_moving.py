@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -32,7 +33,7 @@ def layers() -> RadialManifolds:
     return RadialManifolds(Chart((float(CENTRE[0]), 0.0, 0.0)), (-0.6, 0.6, -0.6, 0.6), middle, halfwidth, 3)
 
 
-def rays(scene: Scene, stride: int = 1, share: float = 400.0, reserve: float = 0.0, **keys: int) -> MovingRays:
+def rays(scene: Scene, stride: int = 1, share: float = 400.0, reserve: float = 0, **keys: int) -> MovingRays:
     sampling = Sampling(shares=keys.get("shares", 1000), sample=keys.get("sample", 1))
     return MovingRays(scene, layers(), stride, share, sampling=sampling, reserve=reserve)
 
@@ -82,7 +83,7 @@ def test_each_frame_has_the_rays_of_its_own_cameras(scene: Scene) -> None:
 
 def test_what_does_not_fit_is_traced_anew_and_is_the_same(scene: Scene) -> None:
     turned = replace(scene, poses=TURNED)
-    kept, anew = rays(turned), rays(turned, reserve=1.0)
+    kept, anew = rays(turned), rays(turned, reserve=math.inf)
     assert kept.part(1, 0, kept.shares)[0] is kept.part(1, 0, kept.shares)[0]
     assert anew.part(1, 0, anew.shares)[0] is not anew.part(1, 0, anew.shares)[0]
     assert seen(kept, 1, kept.shares) == seen(anew, 1, anew.shares)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from tempfile import gettempdir
 from typing import Protocol
 
 import cv2
 import numpy as np
-import psutil
 from numpy.typing import NDArray
 
 from facefolds_core.captures.scene import Scene
@@ -18,6 +19,7 @@ from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.model.radial import RadialManifolds
 from facefolds_core.model.radial_kernel import texture_positions
 from facefolds_core.spacing import spread
+from facefolds_core.system.spill import spilled
 from facefolds_core.training.explicit.teacher import Virtual
 
 Array = NDArray[np.float64]
@@ -71,6 +73,18 @@ class Views:
     def arrays(self) -> tuple[NDArray[np.uint16], NDArray[np.uint16], *tuple[NDArray[np.int32], ...]]:
         """Codes, finer, which, camera, pixel: as `shading_kernel.shade` takes them."""
         return self.codes, self.finer, self.which, self.camera, self.pixel
+
+    @property
+    def size(self) -> int:
+        """Bytes."""
+        return sum(array.nbytes for array in vars(self).values())
+
+    def spilled(self) -> Views:
+        """The same in temporary files, which the system reads ahead and keeps in memory as far as it has some."""
+        found = {name: spilled(array.shape, array.dtype) for name, array in vars(self).items()}
+        for name, array in vars(self).items():
+            found[name][:] = array
+        return Views(**found)
 
     def part(self, chosen: NDArray[np.integer]) -> Views:
         """Some of the pixels, copied."""
@@ -272,14 +286,14 @@ class Sampling:
 
 SAMPLING = Sampling()
 
-RESERVE = 0.3
-"""Of the machine's memory that stays free when traced rays are kept. Of 100 frames of 500 x 768 by 24 cameras, 24 key
-frames have 10 GB of them, and to trace one takes ten times as long as a step on it."""
+RESERVE = 4 << 30
+"""Bytes of the folder of temporary files that stay free when traced rays are kept there. 18 frames of 500 x 768 by 22
+cameras have 10 GB of them, and to trace one takes ten times as long as a step on it."""
 
 
 class MovingRays:
     """Of a head that turns: the cameras stand elsewhere in its own frame in each frame, so that each has crossings of
-    its own. They are traced in shares when they are asked for, and kept while there is room.
+    its own. They are traced in shares when they are asked for, and kept in temporary files while there is room.
 
     Args:
         scene: with poses.
@@ -305,7 +319,7 @@ class MovingRays:
         self._first, self._stride = first, stride
         self._tracer = Tracer(scene, manifolds, virtual)
         self._kept: dict[tuple[int, int], Views] = {}
-        self._reserve = reserve * psutil.virtual_memory().total
+        self._reserve = reserve
         frames = spread(range(scene.num_frames), sampling.frames)
         found = [len(self._traced(k, 0, sampling.sample).pixel) for k in frames]
         self.count = sampling.sample * sum(found) // len(found)
@@ -321,8 +335,8 @@ class MovingRays:
         views = self._kept.get((frame, number))
         if views is None:
             views = self._traced(frame, number, self.shares)
-            if psutil.virtual_memory().available > self._reserve:
-                self._kept[frame, number] = views
+            if shutil.disk_usage(gettempdir()).free - views.size > self._reserve:
+                views = self._kept[frame, number] = views.spilled()
         finer = max(1, round(parts / self.shares))
         return views, np.arange(rest % finer, len(views.pixel), finer)
 
