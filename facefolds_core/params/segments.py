@@ -26,7 +26,7 @@ class SegmentParams(Section):
     frames: Count = 12
     """Frames of a segment: the most that is lost when a training is killed."""
 
-    steps: Count = 16
+    steps: Count = 4
     """Steps of each frame against the base, all at full resolution."""
 
     processes: Natural = 0

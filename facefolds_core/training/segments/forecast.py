@@ -27,6 +27,9 @@ TEXELS_PER_PIXEL = 3.8
 RAY_SECONDS = 1500e-9
 """Of one core for a ray and step, by which the time is forecast."""
 
+FOLLOWING = 6
+"""Steps as long as which it takes, of a frame of a segment, to find and to follow what moves."""
+
 PROCESS_SECONDS = 20.0
 """Of work on one core that are worth a process."""
 
@@ -69,7 +72,7 @@ def forecast(scene: Scene, params: ExplicitParams) -> Forecast:
     memory = round(keys * texels * TEXEL_BYTES + rays * _ray_bytes(params) + cut_outs + FLOOR_BYTES)
     steps = max(params.iterations, params.textures.steps_per_frame * keys)
     if not at_once:
-        steps += segments.steps * frames
+        steps += (segments.steps + FOLLOWING) * frames
     seconds = _seconds(params, steps, texels) / numba.get_num_threads()
     base = model_bytes((1, texels), params.layers, keys)
     disk = base if at_once else base + 2 * texels * frames * (3 + params.layers)
@@ -88,7 +91,7 @@ def processes_for(scene: Scene, params: ExplicitParams, texels: int, segments: i
         return min(asked, segments)
     available = FREE_SHARE * psutil.virtual_memory().available
     room = int(available / process_bytes(scene, params, texels))
-    work = _seconds(params, frames * params.segments.steps, texels)
+    work = _seconds(params, frames * (params.segments.steps + FOLLOWING), texels)
     return max(1, min(numba.get_num_threads(), segments, room, int(work / PROCESS_SECONDS)))
 
 
