@@ -1,7 +1,6 @@
 """The documents' pictures of a subject, and whether they are still what would be made today.
 
 python -m docs.tools.pictures              makes face.webp, actor, frames, limits, report, player and sizes.jpg
-python -m docs.tools.pictures hero.jpg     of what `make hero` has made
 python -m docs.tools.pictures --check      refuses pictures that are not of this asset, these options, or were edited
 
 What each was made from stands in docs/images/made.json; report.jpg needs `facefolds report data/actor` and Chromium,
@@ -37,6 +36,7 @@ from facefolds_core.rendering.opengl_reflection import Glossy
 from facefolds_core.rendering.pixels import SIDE, finer
 from facefolds_core.serving.player import find_player
 from facefolds_core.serving.server import serving
+from facefolds_core.spacing import spread
 from tests.chromium import FLAGS, chromium
 
 IMAGES = ROOT / "docs" / "images"
@@ -60,22 +60,18 @@ LIMITS |= {"views": [[115, 8, 30, 40, 440], [24, 12, 220, 25, 216], [4, 2, 130, 
 """Azimuth and elevation in degrees, then left, top and width of what is cut out of a picture of `size`, pixels."""
 
 
-FRAMES: dict[str, Any] = {"camera": "A011", "panel": [150, 172], "columns": 6, "every": 1, "gap": 4, "quality": 84}
+FRAMES: dict[str, Any] = {"camera": "A011", "panel": [150, 172], "columns": 6, "most": 30, "gap": 4, "quality": 84}
 FRAMES |= {"corners": [[-58, -34, 930], [58, 92, 930]]}
-HERO: dict[str, Any] = {**FRAMES, "panel": [240, 275], "columns": 5, "every": 4, "quality": 80}
-"""A held-out camera; pixels of a picture, pictures a row, each so-manieth frame; eyes and mouth lie between the
-corners, millimetres in the world of the actor's capture."""
-HERO_RUN = ROOT / "dist" / "hero" / "run" / "data" / "hero"
+"""A held-out camera; pixels of a picture, pictures a row, frames at most; eyes and mouth lie between the corners,
+millimetres in the world of the actor's capture."""
 
 
 class Picture(NamedTuple):
-    """One file of `IMAGES`: from which file of the subject it is known to be old, and how it is made; of which
-    subject, if it is always the same."""
+    """One file of `IMAGES`: from which file of the subject it is known to be old, and how it is made."""
 
     source: str
     options: dict[str, Any]
     make: Callable[[Path, Path], None]
-    of: Path | None = None
 
 
 def film(subject: Path, out: Path) -> None:
@@ -124,16 +120,17 @@ def limits(subject: Path, out: Path) -> None:
     whole.save(out, "JPEG", quality=LIMITS["quality"], optimize=True)
 
 
-def eyes_and_mouth(options: dict[str, Any], subject: Path, out: Path) -> None:
-    """Of the frames of `FRAMES` or `HERO`: the photo above the asset, which stands in the empty room."""
+def every_frame(subject: Path, out: Path) -> None:
+    """Eyes and mouth of every frame, or of as many, evenly, as there is room for: the photo above the asset, which
+    stands in the empty room."""
     asset, scene = read_asset(subject / "asset"), read_scene(subject / "scene")
-    panel, columns, gap = options["panel"], options["columns"], options["gap"]
-    index = next(i for i, camera in enumerate(scene.cameras) if camera.name == options["camera"])
+    panel, columns, gap = FRAMES["panel"], FRAMES["columns"], FRAMES["gap"]
+    index = next(i for i, camera in enumerate(scene.cameras) if camera.name == FRAMES["camera"])
     photos, plates = scene.open_frames(), scene.open_plates()
-    corners = scene.from_capture.apply(np.array(options["corners"], float))
+    corners = scene.from_capture.apply(np.array(FRAMES["corners"], float))
     room = None if plates is None else plates.image(index, 0) / 255
     pairs = []
-    for frame in range(0, scene.num_frames, options["every"]):
+    for frame in spread(range(scene.num_frames), FRAMES["most"]):
         seen, _ = scene.camera_in_head(index, frame).project(corners)
         box = tuple(np.rint([*seen.min(0), *seen.max(0)]).astype(int).tolist())
         rgb, alpha = view_of(asset.full, scene.cameras[index], frame).composite(asset.frame(frame))
@@ -144,7 +141,7 @@ def eyes_and_mouth(options: dict[str, Any], subject: Path, out: Path) -> None:
     pairs = [np.pad(pair, ((0, 2 * gap), (0, gap), (0, 0)), constant_values=255) for pair in pairs]
     pairs += [np.full_like(pairs[0], 255)] * (-len(pairs) % columns)
     rows = [np.hstack(pairs[k : k + columns]) for k in range(0, len(pairs), columns)]
-    Image.fromarray(np.vstack(rows)).save(out, "JPEG", quality=options["quality"], optimize=True)
+    Image.fromarray(np.vstack(rows)).save(out, "JPEG", quality=FRAMES["quality"], optimize=True)
 
 
 def page(subject: Path, out: Path) -> None:
@@ -209,8 +206,7 @@ def side_by_side(shots: Sequence[Image.Image], gap: int, out: Path, quality: int
 PICTURES = {
     "face.webp": Picture("asset/manifest.json", FILM, film),
     "actor.jpg": Picture("evaluation/contact_sheet.png", SHEET, sheet),
-    "frames.jpg": Picture("asset/manifest.json", FRAMES, partial(eyes_and_mouth, FRAMES)),
-    "hero.jpg": Picture("asset/manifest.json", HERO, partial(eyes_and_mouth, HERO), HERO_RUN),
+    "frames.jpg": Picture("asset/manifest.json", FRAMES, every_frame),
     "limits.jpg": Picture("asset/manifest.json", LIMITS, limits),
     "report.jpg": Picture("metrics.json", PAGE, page),
     "player.jpg": Picture("asset/manifest.json", PLAYER, partial(player, PLAYER)),
@@ -222,7 +218,7 @@ def stale(subject: Path, images: Path = IMAGES) -> list[str]:
     """What is wrong with the pictures in words; without the subject's files only what the record itself shows."""
     record, found = read_json(images / RECORD), []
     for name, picture in PICTURES.items():
-        made, source = record.get(name), (picture.of or subject) / picture.source
+        made, source = record.get(name), subject / picture.source
         if made is None or not (images / name).exists():
             found.append(f"{name}: not made by this command")
         elif made["sha256"] != file_sha256(images / name):
@@ -241,12 +237,10 @@ def make(name: str, subject: Path, images: Path = IMAGES) -> None:
         UserError: if the subject lacks what it is made from.
     """
     picture = PICTURES[name]
-    of = picture.of or subject
-    if not (source := of / picture.source).exists():
-        remedy = f"run `make {'repro' if picture.of is None else 'hero'}`"
-        raise UserError("nothing to make a picture from", file=source, remedy=remedy)
+    if not (source := subject / picture.source).exists():
+        raise UserError("nothing to make a picture from", file=source, remedy="run `make repro`")
     with atomic_file(images / name) as temporary:
-        picture.make(of, temporary)
+        picture.make(subject, temporary)
     record = read_json(images / RECORD) if (images / RECORD).exists() else {}
     digests = {"sha256": file_sha256(images / name), "source": file_sha256(source)}
     record[name] = {"commit": commit_name(), **digests, "options": picture.options}
@@ -254,9 +248,7 @@ def make(name: str, subject: Path, images: Path = IMAGES) -> None:
 
 
 def main(
-    names: Annotated[
-        list[str] | None, typer.Argument(help=f"Of {', '.join(PICTURES)}; all but the hero's if left out.")
-    ] = None,
+    names: Annotated[list[str] | None, typer.Argument(help=f"Of {', '.join(PICTURES)}; all if left out.")] = None,
     subject: Annotated[Path, typer.Option(help="Folder of the embedded actor's results.")] = Path("data/actor"),
     check: Annotated[bool, typer.Option("--check", help="Make nothing; refuse pictures that are stale.")] = False,
 ) -> None:
@@ -267,8 +259,7 @@ def main(
         if unknown := set(names or []) - set(PICTURES):
             expected = ", ".join(PICTURES)
             raise UserError("no such picture", expected=expected, found=", ".join(unknown), remedy="name one of these")
-        of_subject = [name for name, picture in PICTURES.items() if picture.of is None]
-        for name in [] if check else names or of_subject:
+        for name in [] if check else names or PICTURES:
             make(name, subject)
             typer.echo(f"pictures: {IMAGES / name} ({(IMAGES / name).stat().st_size / 1000:.0f} kB)")
 

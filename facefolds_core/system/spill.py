@@ -1,9 +1,13 @@
-"""Arrays of a row a frame, too large for memory: they lie in a file without a name, which the system gives back."""
+"""Arrays too large for memory: they lie in files without a name, which the system gives back."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from tempfile import TemporaryFile
+import mmap
+import os
+import shutil
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from tempfile import TemporaryFile, gettempdir
 from typing import Any
 
 import numpy as np
@@ -15,12 +19,46 @@ IN_MEMORY = 1 << 23
 ROWS = 16
 """Of a larger one, that are worked on at a time."""
 
+ALIGNED = 64
+"""Bytes at whose multiples arrays of one file begin."""
+
+
+def spill_folder() -> Path:
+    """Where files lie: `TMPDIR`; else /var/tmp, since /tmp is memory on many systems."""
+    large = Path("/var/tmp")
+    return large if "TMPDIR" not in os.environ and os.access(large, os.W_OK) else Path(gettempdir())
+
+
+def spilled_together(arrays: Mapping[str, NDArray[Any]], reserve: float) -> dict[str, NDArray[Any]] | None:
+    """The same arrays, of whatever size, in one file; None if less than `reserve` bytes would stay free beside it."""
+    starts, size = {}, 0
+    for name, array in arrays.items():
+        starts[name] = size
+        size += -(-array.nbytes // ALIGNED) * ALIGNED
+    if not size or shutil.disk_usage(spill_folder()).free - size < reserve:
+        return None
+    try:
+        with TemporaryFile(dir=spill_folder()) as file:
+            if hasattr(os, "posix_fallocate"):
+                os.posix_fallocate(file.fileno(), 0, size)  # a file with holes ends the process where the disk is full
+            else:
+                file.truncate(size)
+            whole = mmap.mmap(file.fileno(), size)
+    except OSError:
+        return None
+    found = {}
+    for name, array in arrays.items():
+        flat = np.frombuffer(whole, array.dtype, array.size, starts[name])
+        found[name] = flat.reshape(array.shape)
+        found[name][:] = array
+    return found
+
 
 def spilled(shape: tuple[int, ...], dtype: DTypeLike = float) -> NDArray[Any]:
     """An empty array; a large one in a temporary file that is gone with it."""
     if int(np.prod(shape)) * np.dtype(dtype).itemsize <= IN_MEMORY:
         return np.empty(shape, dtype)
-    with TemporaryFile() as file:
+    with TemporaryFile(dir=spill_folder()) as file:
         return np.memmap(file, dtype, "w+", shape=shape).view(np.ndarray)
 
 

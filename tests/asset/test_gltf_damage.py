@@ -85,6 +85,7 @@ MISTAKES: dict[str, tuple[Callable[[Document], Any], str]] = {
         lambda d: layered(d)["torso"].update(normal=[1, 1, 0]),
         f"/nodes/0/extensions/{NAME}/torso/normal: not of unit length",
     ),
+    "a torso of a scaled node": (lambda d: d["nodes"][0].update(scale=[2, 2, 2]), "/nodes/0/scale: none is taken with"),
     "nothing to stay over": (
         lambda d: layered(d).pop("animation"),
         f"/nodes/0/extensions/{NAME}/torso: there is no animation",

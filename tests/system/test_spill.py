@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import math
 from pathlib import Path
 from unittest.mock import patch
 
@@ -20,11 +22,39 @@ def test_small_arrays_stay_in_memory_and_large_ones_do_not() -> None:
     assert large[-1] == 2.0
 
 
-def test_nothing_is_left_behind(tmp_path: Path) -> None:
-    with patch("tempfile.tempdir", str(tmp_path)), patch.object(spill, "IN_MEMORY", 0):
+@pytest.fixture
+def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Where files lie."""
+    monkeypatch.setenv("TMPDIR", str(tmp_path))
+    monkeypatch.setattr("tempfile.tempdir", None)
+    return tmp_path
+
+
+def test_nothing_is_left_behind(place: Path) -> None:
+    with patch.object(spill, "IN_MEMORY", 0):
         array = spill.spilled((5, 5))
         array[:] = 1
-    assert list(tmp_path.iterdir()) == []
+    assert spill.spill_folder() == place and list(place.iterdir()) == []
+
+
+def test_arrays_of_one_file_are_the_same(place: Path) -> None:
+    random = np.random.default_rng(1)
+    arrays = {"a": random.normal(size=(3, 5)), "none": np.zeros((0, 4), np.uint16), "b": np.arange(7, dtype=np.int32)}
+    before = len(list(Path("/proc/self/fd").iterdir())) if Path("/proc/self/fd").exists() else 0
+    found = spill.spilled_together(arrays, 0)
+    assert found is not None and list(place.iterdir()) == []
+    for name, array in arrays.items():
+        assert found[name].dtype == array.dtype
+        np.testing.assert_array_equal(found[name], array)
+    if before:
+        assert len(list(Path("/proc/self/fd").iterdir())) == before + 1  # one open file for all
+
+
+@pytest.mark.parametrize("reserve", [0.0, math.inf])
+def test_without_room_there_is_no_file(reserve: float) -> None:
+    full = OSError(errno.ENOSPC, "no space")
+    with patch("os.posix_fallocate", side_effect=full):
+        assert spill.spilled_together({"a": np.zeros(4)}, reserve) is None
 
 
 @pytest.mark.parametrize("frames", [None, [3, 0, 39]])

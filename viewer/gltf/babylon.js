@@ -123,6 +123,7 @@ class LayeredVideo {
     this.rate = said.frameRate[0] / said.frameRate[1];
     this.picture = new HtmlElementTexture(NAME, video, { scene });
     meshes.forEach((mesh, layer) => this.dress(mesh, layer));
+    if (said.torso) this.stand();
     this.observer = scene.onBeforeCameraRenderObservable.add((camera) => this.prepare(camera));
     follow(video, this.rate, said.frames, (frame) => this.show(frame));
   }
@@ -151,7 +152,9 @@ class LayeredVideo {
     const rest = Matrix.Compose(Vector3.One(), own, Vector3.FromArray(translation));
     const now = Matrix.Compose(Vector3.One(), rotationQuaternion ?? Quaternion.Identity(), position);
     const stay = rest.multiply(now.invert()); // rows: the first is applied first
-    const { center, radius } = this.meshes[0].getBoundingInfo().boundingSphere;
+    const spheres = this.meshes.map((mesh) => mesh.getBoundingInfo().boundingSphere);
+    const { center } = spheres[0];
+    const radius = Math.max(...spheres.map((one) => Vector3.Distance(one.center, center) + one.radius));
     const turn = 2 * Math.acos(Math.min(1, Math.abs(Quaternion.Dot(own, rotationQuaternion ?? Quaternion.Identity()))));
     this.strays = Vector3.Distance(Vector3.TransformCoordinates(center, stay), center) + 2 * radius * Math.sin(turn / 2);
     for (const { material } of this.meshes) material.setMatrix("stay", stay);
@@ -186,6 +189,7 @@ class LayeredVideo {
     material.setMatrix("stay", Matrix.Identity());
     if (maps) this.polish(material, layer);
     mesh.material = material;
+    mesh.alwaysSelectAsActiveMesh = said.torso !== undefined;
     mesh.alphaIndex = this.meshes.length - layer; // the innermost is drawn first
   }
 
@@ -205,7 +209,7 @@ class LayeredVideo {
     const spheres = this.meshes.map((mesh) => mesh.getBoundingInfo().boundingSphere);
     const centre = spheres[0].centerWorld;
     const far = spheres.map((one) => Vector3.Distance(one.centerWorld, centre) + one.radiusWorld);
-    const reach = Math.max(...far) + this.strays;
+    const reach = Math.max(...far) + (this.strays * spheres[0].radiusWorld) / spheres[0].radius;
     const along = this.scene.useRightHandedSystem ? -1 : 1;
     const distance = along * Vector3.TransformCoordinates(centre, camera.getViewMatrix()).z;
     const range = depths(camera.getProjectionMatrix().m, distance, reach, along);

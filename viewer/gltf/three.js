@@ -75,6 +75,7 @@ export class LayeredVolumetricVideo {
     const tracks = this.shown.map((mesh) => mesh.said.animation);
     result.animations = result.animations.filter((_, index) => !tracks.includes(index));
     result.userData.volumetricVideos = this.shown;
+    for (const mesh of this.shown) if (mesh.said.torso) mesh.stand();
   }
 }
 
@@ -94,6 +95,7 @@ export class LayeredVideoMesh extends THREE.Mesh {
     Object.assign(this, { said, video, picture, track, frame: 0 });
     this.stay = new THREE.Matrix4();
     this.strays = 0; // how far what stays may be from where the node takes it
+    this.frustumCulled = said.torso === undefined;
     this.rate = said.frameRate[0] / said.frameRate[1];
     this.geometry.computeBoundingSphere();
     follow(video, this.rate, said.frames, (frame) => this.pose(frame));

@@ -30,6 +30,8 @@ from facefolds_core.geometry.track import UNIT
 BT709_LIMITED = (1, 1)
 EDGE = 1e-6
 """How far beyond [0, 1] texture coordinates may be."""
+LENGTH = 1e-4
+"""How far from 1 the length of a torso's normal or quaternion may be."""
 INSTANT = 1e-3
 """Of a frame's time: how far a key of the animation may be from its picture."""
 
@@ -234,15 +236,19 @@ def _motion_problems(glb: Glb, said: LayeredVideo, place: str, node: int) -> Ite
         yield f"/animations/{said.animation}/channels: none, or two for one path"
 
 
-def _torso_problems(glb: Glb, said: LayeredVideo, place: str, _: int) -> Iterator[str]:
+def _torso_problems(glb: Glb, said: LayeredVideo, place: str, node: int) -> Iterator[str]:
     """What stays while the node moves."""
     one = said.torso
     if one is None:
         return
     if said.animation is None:
         yield f"{place}/torso: there is no animation over which it would stay"
+    if any(abs(part - 1) > EDGE for part in glb.gltf.nodes[node].scale):
+        yield f"/nodes/{node}/scale: none is taken with a torso"
+    if not np.abs([one.offset, *one.translation]).max() <= FARTHEST:
+        yield f"{place}/torso: more than {FARTHEST:g} units away"
     for name, values in (("normal", one.normal), ("rotation", one.rotation)):
-        if not abs(np.linalg.norm(values) - 1) <= UNIT:
+        if not abs(np.linalg.norm(values) - 1) <= LENGTH:
             yield f"{place}/torso/{name}: not of unit length"
 
 

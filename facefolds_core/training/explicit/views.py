@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from tempfile import gettempdir
 from typing import Protocol
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from tqdm import tqdm
 
 from facefolds_core.captures.scene import Scene
 from facefolds_core.errors import UserError
@@ -19,7 +18,7 @@ from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.model.radial import RadialManifolds
 from facefolds_core.model.radial_kernel import texture_positions
 from facefolds_core.spacing import spread
-from facefolds_core.system.spill import spilled
+from facefolds_core.system.spill import spill_folder, spilled_together
 from facefolds_core.training.explicit.teacher import Virtual
 
 Array = NDArray[np.float64]
@@ -73,18 +72,6 @@ class Views:
     def arrays(self) -> tuple[NDArray[np.uint16], NDArray[np.uint16], *tuple[NDArray[np.int32], ...]]:
         """Codes, finer, which, camera, pixel: as `shading_kernel.shade` takes them."""
         return self.codes, self.finer, self.which, self.camera, self.pixel
-
-    @property
-    def size(self) -> int:
-        """Bytes."""
-        return sum(array.nbytes for array in vars(self).values())
-
-    def spilled(self) -> Views:
-        """The same in temporary files, which the system reads ahead and keeps in memory as far as it has some."""
-        found = {name: spilled(array.shape, array.dtype) for name, array in vars(self).items()}
-        for name, array in vars(self).items():
-            found[name][:] = array
-        return Views(**found)
 
     def part(self, chosen: NDArray[np.integer]) -> Views:
         """Some of the pixels, copied."""
@@ -287,7 +274,7 @@ class Sampling:
 SAMPLING = Sampling()
 
 RESERVE = 4 << 30
-"""Bytes of the folder of temporary files that stay free when traced rays are kept there. 18 frames of 500 x 768 by 22
+"""Bytes that stay free where traced rays are kept in temporary files. 18 frames of 500 x 768 by 22
 cameras have 10 GB of them, and to trace one takes ten times as long as a step on it."""
 
 
@@ -319,7 +306,7 @@ class MovingRays:
         self._first, self._stride = first, stride
         self._tracer = Tracer(scene, manifolds, virtual)
         self._kept: dict[tuple[int, int], Views] = {}
-        self._reserve = reserve
+        self._reserve, self._told = reserve, False
         frames = spread(range(scene.num_frames), sampling.frames)
         found = [len(self._traced(k, 0, sampling.sample).pixel) for k in frames]
         self.count = sampling.sample * sum(found) // len(found)
@@ -334,11 +321,22 @@ class MovingRays:
         number = (self._first + frame * self._used + turn) % self.shares
         views = self._kept.get((frame, number))
         if views is None:
-            views = self._traced(frame, number, self.shares)
-            if shutil.disk_usage(gettempdir()).free - views.size > self._reserve:
-                views = self._kept[frame, number] = views.spilled()
+            views = self._keep((frame, number), self._traced(frame, number, self.shares))
         finer = max(1, round(parts / self.shares))
         return views, np.arange(rest % finer, len(views.pixel), finer)
+
+    def _keep(self, key: tuple[int, int], views: Views) -> Views:
+        """The same in a temporary file, which the system holds in memory as far as it has some."""
+        kept = spilled_together(vars(views), self._reserve)
+        if kept is not None:
+            views = self._kept[key] = Views(**kept)
+        elif not self._told:
+            self._told = True
+            tqdm.write(
+                f"train: no room for traced rays in {spill_folder()}: they are traced again and again, which takes "
+                "several times as long; TMPDIR names another folder"
+            )
+        return views
 
     def in_use(self, frame: int) -> Iterator[Views]:
         """See `Rays`; share by share."""

@@ -106,6 +106,7 @@ func _place(number):
 	for layer in get_children():
 		if layer is MeshInstance:
 			layer.transform = Transform.IDENTITY if still else placed
+			layer.extra_cull_margin = 2.0 * _radius if contents.has("torso") else 0.0
 
 
 # A pose in the asset's own axes.
