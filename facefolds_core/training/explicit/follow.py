@@ -65,16 +65,6 @@ def follow_rates(params: ExplicitParams) -> NDArray[np.float32]:
 
 def mean_errors(state: TextureState, source: Rays, pictures: CutOuts, frame: int, light: Light) -> Errors:
     """(M, 3): mean C - I over the rays that meet each texel; 0 of texels that show less than half a ray."""
-    total = summed_errors(state, source, pictures, frame, light)
-    known = total[:, 3:] >= 0.5
-    return np.where(known, total[:, :3] / np.where(known, total[:, 3:], 1), 0)
-
-
-def summed_errors(state: TextureState, source: Rays, pictures: CutOuts, frame: int, light: Light) -> Errors:
-    """(M, 4): sums of w (C - I) and of w over the rays that meet each texel, as many as those of four steps at most.
-
-    w is what a texel adds to a ray's colour, so that the former is the gradient of 0.5 |C - I|^2 by its colour.
-    """
     (h, w), n = state.shape, state.layers.shape[2]
     sums, texture = state.gradient.numpy().reshape(n, h, w, 4), _texture(state, frame)
     cut, behind, least = pictures.cut(frame), pictures.behind, MIN_LIGHT
@@ -85,9 +75,10 @@ def summed_errors(state: TextureState, source: Rays, pictures: CutOuts, frame: i
         light(state, views, frame)
         rays = *views.arrays, np.arange(0, len(views.pixel), apart)
         shading_kernel.shade(*rays, cut, behind, texture, state.shine, sums, 0.0, least, True)
-    total: Errors = sums.sum(0, dtype=np.float32).reshape(h * w, 4)
+    total = sums.sum(0, dtype=np.float32).reshape(h * w, 4)
     sums[:] = 0
-    return total
+    known = total[:, 3:] >= 0.5
+    return np.where(known, total[:, :3] / np.where(known, total[:, 3:], 1), 0)
 
 
 def lagging(errors: Errors, shape: tuple[int, int], least: float) -> NDArray[np.bool_]:

@@ -27,7 +27,6 @@ from facefolds_core.training.explicit.gloss import GlossFit
 from facefolds_core.training.explicit.plan import SETTLING, Level, epochs
 from facefolds_core.training.explicit.rates import falling, rates_of
 from facefolds_core.training.explicit.second_surface import LAYERS, second_layers, shells_of_both
-from facefolds_core.training.explicit.settle import settle_frame
 from facefolds_core.training.explicit.state import MIN_ALPHA, TextureState, on_one_thread
 from facefolds_core.training.explicit.targets import CutOuts
 from facefolds_core.training.explicit.teacher import Teacher
@@ -102,7 +101,7 @@ class Trainer:
         self._step(level, number, live, bar)
         self._judge_reflection(number, bar)
         if number >= len(self.params.geometry.rounds):
-            self._follow(level.last)
+            self._follow()
 
     def _judge_reflection(self, number: int, bar: tqdm) -> None:
         """After a level, where it is time: whether the reflection helps."""
@@ -232,14 +231,12 @@ class Trainer:
     def _rates(self, pace: float, progress: float) -> NDArray[np.float32]:
         return rates_of(pace * self.params.textures.learning_rate * falling(progress))
 
-    def _follow(self, settle: bool) -> None:
-        """Frames where they lag behind what moves; in the end their colours everywhere."""
+    def _follow(self) -> None:
+        """Frames where they lag behind what moves."""
         assert self.state is not None and self.views is not None
         rates = follow_rates(self.params)
         self.usual, share = follow(self.state, self.views, self.pictures, rates, self.gloss.light)
         self.events.append(fact("followed", share=share))
-        for frame in range(self.scene.num_frames if settle else 0):
-            settle_frame(self.state, self.views, self.pictures, frame, self.gloss.light)
 
     def result(self, fingerprint: str) -> tuple[RadianceManifolds, ExplicitSpec]:
         """The model, without the layers that show nothing."""

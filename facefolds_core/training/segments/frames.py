@@ -19,7 +19,6 @@ from facefolds_core.errors import UserError
 from facefolds_core.params import ExplicitParams
 from facefolds_core.training.explicit.follow import follow_frame, follow_rates, lagging, mean_errors
 from facefolds_core.training.explicit.rates import falling, rates_of
-from facefolds_core.training.explicit.settle import settle_frame
 from facefolds_core.training.explicit.state import MIN_ALPHA, TextureState
 from facefolds_core.training.explicit.targets import CutOuts
 from facefolds_core.training.explicit.views import MovingRays, Rays, StillRays, Views, trace_views
@@ -110,7 +109,7 @@ class FrameFitter:
         return FittedFrame(colour.half(), alpha.half(), psnr, rays)
 
     def _follow(self, frame: int, views: Rays, pictures: CutOuts) -> None:
-        """Where the frame does not follow yet what moves; then its colours everywhere."""
+        """Where the frame does not follow yet what moves."""
         state, found = self.state, self.base.surroundings
 
         def light(state: TextureState, seen: Views, _: int) -> None:
@@ -120,7 +119,6 @@ class FrameFitter:
         errors = mean_errors(state, views, pictures, 0, light)
         chosen = lagging(errors - found.usual, state.shape, self.params.follow.min_error)
         follow_frame(state, views, pictures, 0, chosen, errors, follow_rates(self.params), light)
-        settle_frame(state, views, pictures, 0, light)
 
     def _start(self, shares: NDArray[np.float64]) -> None:
         colour, alpha = self.base.mixed(shares)
