@@ -51,8 +51,8 @@ class TextureParams(Section):
     """The layers' textures, as the model has them."""
 
     resolution: Literal["auto"] | TextureSide = "auto"
-    """R^t: texels a side of each layer's texture. "auto" is the least of 128, 192, 256, 384 and
-    512 that the photos cannot tell from the best."""
+    """R^t: texels a side of each layer's texture. "auto" is the least of 128, 192, 256, 384, 512
+    and 768 that the photos cannot tell from the best."""
 
 
 class BakeParams(Section):
