@@ -4,7 +4,8 @@
     python -m docs.tools.hero --frames 12 --seconds 1.5         a shorter one: minutes
 
 In dist/hero: run/ (a project of its own, so that an interrupted run goes on), asset/, hero.html (plays by a double
-click; `make docs` shows it on the first page), hero.zip (both, with the scores and the licence).
+click; `make docs` shows it on the first page), frames.jpg (eyes and mouth of 25 frames, the photo above the asset),
+hero.zip (asset and page, with the scores and the licence).
 """
 
 from __future__ import annotations
@@ -22,7 +23,8 @@ import yaml
 
 from bench.results import ROOT, commit_name
 from bench.run import own_params
-from docs.tools.site import HERO_COMMIT
+from docs.tools.pictures import FRAMES, every_frame
+from docs.tools.site import HERO_COMMIT, HERO_FRAMES
 from facefolds_core.asset import read_asset
 from facefolds_core.asset.single_page import write_single_page
 from facefolds_core.errors import UserError, report_user_errors
@@ -34,6 +36,8 @@ from facefolds_core.serving.player import find_player
 
 NAME = "hero"
 PARAMS = Path(__file__).with_name("hero.yaml")
+SHEET = {**FRAMES, "panel": [240, 275], "columns": 5, "most": 25}
+"""Every fourth frame of the whole take."""
 
 
 def hero_params(capture: dict[str, Any]) -> dict[str, Any]:
@@ -113,6 +117,7 @@ def main(
         shorter = {"frames": frames, "seconds": seconds}
         write_project(out / "run", hero_params({key: value for key, value in shorter.items() if value is not None}))
         run_pipeline(out / "run")
+        every_frame(out / "run" / "data" / NAME, out / Path(HERO_FRAMES).name, SHEET)
         for path in release(SubjectFolders(out / "run" / "data" / NAME), out):
             typer.echo(f"{NAME}: {path} ({path.stat().st_size / 1e6:.1f} MB)")
 

@@ -120,17 +120,17 @@ def limits(subject: Path, out: Path) -> None:
     whole.save(out, "JPEG", quality=LIMITS["quality"], optimize=True)
 
 
-def every_frame(subject: Path, out: Path) -> None:
+def every_frame(subject: Path, out: Path, options: dict[str, Any]) -> None:
     """Eyes and mouth of every frame, or of as many, evenly, as there is room for: the photo above the asset, which
-    stands in the empty room."""
+    stands in the empty room. `options` as `FRAMES`."""
     asset, scene = read_asset(subject / "asset"), read_scene(subject / "scene")
-    panel, columns, gap = FRAMES["panel"], FRAMES["columns"], FRAMES["gap"]
-    index = next(i for i, camera in enumerate(scene.cameras) if camera.name == FRAMES["camera"])
+    panel, columns, gap = options["panel"], options["columns"], options["gap"]
+    index = next(i for i, camera in enumerate(scene.cameras) if camera.name == options["camera"])
     photos, plates = scene.open_frames(), scene.open_plates()
-    corners = scene.from_capture.apply(np.array(FRAMES["corners"], float))
+    corners = scene.from_capture.apply(np.array(options["corners"], float))
     room = None if plates is None else plates.image(index, 0) / 255
     pairs = []
-    for frame in spread(range(scene.num_frames), FRAMES["most"]):
+    for frame in spread(range(scene.num_frames), options["most"]):
         seen, _ = scene.camera_in_head(index, frame).project(corners)
         box = tuple(np.rint([*seen.min(0), *seen.max(0)]).astype(int).tolist())
         rgb, alpha = view_of(asset.full, scene.cameras[index], frame).composite(asset.frame(frame))
@@ -141,7 +141,7 @@ def every_frame(subject: Path, out: Path) -> None:
     pairs = [np.pad(pair, ((0, 2 * gap), (0, gap), (0, 0)), constant_values=255) for pair in pairs]
     pairs += [np.full_like(pairs[0], 255)] * (-len(pairs) % columns)
     rows = [np.hstack(pairs[k : k + columns]) for k in range(0, len(pairs), columns)]
-    Image.fromarray(np.vstack(rows)).save(out, "JPEG", quality=FRAMES["quality"], optimize=True)
+    Image.fromarray(np.vstack(rows)).save(out, "JPEG", quality=options["quality"], optimize=True)
 
 
 def page(subject: Path, out: Path) -> None:
@@ -206,7 +206,7 @@ def side_by_side(shots: Sequence[Image.Image], gap: int, out: Path, quality: int
 PICTURES = {
     "face.webp": Picture("asset/manifest.json", FILM, film),
     "actor.jpg": Picture("evaluation/contact_sheet.png", SHEET, sheet),
-    "frames.jpg": Picture("asset/manifest.json", FRAMES, every_frame),
+    "frames.jpg": Picture("asset/manifest.json", FRAMES, partial(every_frame, options=FRAMES)),
     "limits.jpg": Picture("asset/manifest.json", LIMITS, limits),
     "report.jpg": Picture("metrics.json", PAGE, page),
     "player.jpg": Picture("asset/manifest.json", PLAYER, partial(player, PLAYER)),

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 ROOT = Path(__file__).resolve().parents[2]
 HERO = "dist/hero/hero.html"
 HERO_COMMIT = "dist/hero/commit.txt"
+HERO_FRAMES = "dist/hero/frames.jpg"
 HERO_CODE = ("facefolds_core", "stages", "viewer/src", "params.yaml", "docs/tools/hero.yaml")
 """What it is made by: when any of it changes, the hero grows older."""
 ACTOR = "data/actor/asset"
@@ -48,6 +49,9 @@ FRAME = (
 )
 
 BESIDE = '<a href="hero.html#photo=0">Beside a picture that no training saw: drag the border.</a>'
+
+
+EVERY_FRAME = '<a href="hero_frames.jpg">Eyes and mouth, the photos above.</a>'
 
 
 def place_of(path: str) -> str:
@@ -117,10 +121,10 @@ def has_photos(root: Path = ROOT) -> bool:
     return (root / HERO).exists() and folder.is_dir() and bool(read_asset(folder).manifest.photos)
 
 
-def first_page(text: str, player: bool, age: str = "", photos: bool = False) -> str:
-    """README.md with the player in place of its first picture, where there is one, and below it the hero's age, and
-    where it is seen beside a photo, with a border to drag."""
-    below = [*([BESIDE] if photos else []), *([age] if age else [])]
+def first_page(text: str, player: bool, age: str = "", photos: bool = False, sheet: bool = False) -> str:
+    """README.md with the player in place of its first picture, where there is one, and below it the hero's age, where
+    it is seen beside a photo, with a border to drag, and the sheet of its eyes and mouth."""
+    below = [*([BESIDE] if photos else []), *([EVERY_FRAME] if sheet else []), *([age] if age else [])]
     frame = f"{FRAME}<p><small>{' '.join(below)}</small></p>" if below else FRAME
     return re.sub(r"^!\[[^\]]*\]\([^)]*\)", lambda _: frame, text, count=1, flags=re.MULTILINE) if player else text
 
@@ -172,11 +176,11 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 
     documents = {f"docs/{file.src_uri}" for file in files.documentation_pages()} | set(MOVED)
     wanted: set[str] = set()
-    playing = playing_page()
+    playing, sheet = playing_page(), ROOT / HERO_FRAMES
     for source in sorted(documents):
         text = (ROOT / source).read_text(encoding="utf-8")
         text, more = relinked(
-            with_steps(first_page(text, playing is not None, hero_age(), has_photos()))
+            with_steps(first_page(text, playing is not None, hero_age(), has_photos(), sheet.exists()))
             if source == "README.md"
             else text,
             source,
@@ -191,6 +195,8 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
         files.append(File.generated(config, place_of(path), abs_src_path=str(ROOT / path)))
     if playing is not None:
         files.append(File.generated(config, "hero.html", content=playing))
+        if sheet.exists():
+            files.append(File.generated(config, "hero_frames.jpg", abs_src_path=str(sheet)))
     return files
 
 

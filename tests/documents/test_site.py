@@ -113,6 +113,8 @@ def test_a_hero_with_photos_is_held_against_one(tmp_path: Path) -> None:
     assert has_photos(tmp_path)
     assert "hero.html#photo=0" in first_page("![x](y)", True, photos=True)
     assert "hero.html#photo=0" not in first_page("![x](y)", True)
+    assert "hero_frames.jpg" in first_page("![x](y)", True, sheet=True)
+    assert "hero_frames.jpg" not in first_page("![x](y)", True)
 
 
 def test_the_librarys_page_has_every_name() -> None:
