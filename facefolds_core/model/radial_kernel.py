@@ -77,6 +77,16 @@ def placed(x: Any, y: Any, z: Any, bend: Any) -> Any:
     return hx, hy, hz
 
 
+@inlined
+def stride(x, y, z, step, bend):  # type: ignore[no-untyped-def]
+    """Through what is empty, from a point on the layers as they were made: what is bent may be drawn together to a part
+    of its length, so that no stride may lead into a torso's band."""
+    if bend is None:
+        return SKIP
+    share, near = _share(x, y, z, bend), SKIP / bend[4]
+    return SKIP if share <= -near or share >= 1.0 + near else step
+
+
 @compiled
 def _share(x: Any, y: Any, z: Any, bend: Any) -> Any:
     """s, from below 0 to above 1."""
@@ -207,7 +217,8 @@ def crossing_distances(
     """(R, N) float32: distance of the nearest crossing with each layer; 0 where there is none.
 
     Marches with `step` between samples through the ball |x - c| < `bound` (its front half, where the window has no
-    more), and in strides of SKIP far above all layers; of what is bent through all of a larger ball, with `step` alone.
+    more), and in strides of SKIP far above all layers; of what is bent through all of a larger ball, and in a torso's
+    band with `step` alone.
     A crossing lies between neighbouring samples inside the window at which the radius minus rho changes sign; it is
     refined by regula falsi.
     """
@@ -238,10 +249,8 @@ def cross(
     ox, oy, oz = offsets[ray, 0], offsets[ray, 1], offsets[ray, 2]
     dx, dy, dz = directions[ray, 0], directions[ray, 1], directions[ray, 2]
     along = ox * dx + oy * dy + oz * dz
-    skip = SKIP
     if bend is not None:
         bound += bend[17]
-        skip = step  # what is bent may be drawn together to a part of its length
     disc = along * along - (ox * ox + oy * oy + oz * oz - bound * bound)
     if disc <= 0.0:
         return
@@ -270,7 +279,7 @@ def cross(
             last = -1.0
             if s >= far:
                 break
-            s = min(s + skip, far)
+            s = min(s + stride(x, y, z, step, bend), far)
             continue
         row, column = _grid_position(u, v, window, rows, columns)
         if row < 0.0 or column < 0.0 or row > rows - 1 or column > columns - 1:
