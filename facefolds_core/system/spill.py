@@ -35,7 +35,9 @@ def spilled_together(arrays: Mapping[str, NDArray[Any]], reserve: float) -> dict
     for name, array in arrays.items():
         starts[name] = size
         size += -(-array.nbytes // ALIGNED) * ALIGNED
-    if not size or shutil.disk_usage(spill_folder()).free - size < reserve:
+    if not size:
+        return dict(arrays)
+    if shutil.disk_usage(spill_folder()).free - size < reserve:
         return None
     try:
         with TemporaryFile(dir=spill_folder()) as file:

@@ -50,6 +50,11 @@ def test_arrays_of_one_file_are_the_same(place: Path) -> None:
         assert len(list(Path("/proc/self/fd").iterdir())) == before + 1  # one open file for all
 
 
+def test_nothing_needs_no_room() -> None:
+    found = spill.spilled_together({"none": np.zeros((0, 4))}, math.inf)
+    assert found is not None and found["none"].shape == (0, 4)
+
+
 @pytest.mark.parametrize("reserve", [0.0, math.inf])
 def test_without_room_there_is_no_file(reserve: float) -> None:
     full = OSError(errno.ENOSPC, "no space")

@@ -71,7 +71,7 @@ class Reflection(GltfPart):
         return {to_camel(name): getattr(self, name) for name in names}
 
 
-class Torso(GltfPart):
+class NodeTorso(GltfPart):
     """What stays while the animation moves the node: all beyond a plane, as shoulders do. A reader may ignore it.
 
     Attributes:
@@ -132,7 +132,7 @@ class LayeredVideo(GltfPart):
     frame_rate: tuple[RateTerm, RateTerm]
     still_frame: Annotated[int, Field(ge=0)] = 0
     animation: Maybe[Index] = None
-    torso: Maybe[Torso] = None
+    torso: Maybe[NodeTorso] = None
     reflection: Maybe[Reflection] = None
     checksums: Maybe[Annotated[tuple[Checksum, ...], Field(min_length=1)]] = None
 

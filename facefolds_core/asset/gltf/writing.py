@@ -33,7 +33,15 @@ from facefolds_core.asset.glb import (
     triangles_of,
     write_document,
 )
-from facefolds_core.asset.gltf.extension import DRACO, NAME, TEXTURE_VIDEO, Checksum, LayeredVideo, Reflection, Torso
+from facefolds_core.asset.gltf.extension import (
+    DRACO,
+    NAME,
+    TEXTURE_VIDEO,
+    Checksum,
+    LayeredVideo,
+    NodeTorso,
+    Reflection,
+)
 from facefolds_core.asset.manifest import Video
 from facefolds_core.asset.manifest_base import StoredFile
 from facefolds_core.asset.manifest_extras import Audio
@@ -174,13 +182,13 @@ def _said(level: AssetLevel, still: int) -> LayeredVideo:
     )
 
 
-def _torso(track: Track) -> Torso | None:
+def _torso(track: Track) -> NodeTorso | None:
     """What stays while the animation moves the node."""
     one = track.torso
     if one is None:
         return None
     w, x, y, z = one.quaternion
-    return Torso(
+    return NodeTorso(
         normal=one.normal, offset=one.offset, band=one.band, rotation=(x, y, z, w), translation=one.translation
     )
 
