@@ -156,7 +156,8 @@ class LayeredVideo {
     const { center } = spheres[0];
     const radius = Math.max(...spheres.map((one) => Vector3.Distance(one.center, center) + one.radius));
     const turn = 2 * Math.acos(Math.min(1, Math.abs(Quaternion.Dot(own, rotationQuaternion ?? Quaternion.Identity()))));
-    this.strays = Vector3.Distance(Vector3.TransformCoordinates(center, stay), center) + 2 * radius * Math.sin(turn / 2);
+    this.strays =
+      Vector3.Distance(Vector3.TransformCoordinates(center, stay), center) + 2 * radius * Math.sin(turn / 2);
     for (const { material } of this.meshes) material.setMatrix("stay", stay);
   }
 

@@ -122,11 +122,7 @@ export class LayeredVideoMesh extends THREE.Mesh {
     const { rotation, translation } = this.said.torso;
     const { center, radius } = this.geometry.boundingSphere;
     const one = new THREE.Vector3(1, 1, 1);
-    const rest = new THREE.Matrix4().compose(
-      new THREE.Vector3(...translation),
-      new THREE.Quaternion(...rotation),
-      one,
-    );
+    const rest = new THREE.Matrix4().compose(new THREE.Vector3(...translation), new THREE.Quaternion(...rotation), one);
     const now = new THREE.Matrix4().compose(this.position, this.quaternion, one);
     this.stay.copy(now.invert().multiply(rest));
     const turn = this.quaternion.angleTo(new THREE.Quaternion(...rotation));
