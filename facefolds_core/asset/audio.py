@@ -1,14 +1,17 @@
-"""The sequence's sound, as AAC in an MP4 file of its own."""
+"""The sequence's sound, as AAC in an MP4 file of its own, and under films that show the sequence."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from fractions import Fraction
 from itertools import chain
 from pathlib import Path
 from typing import Any
 
 import av
+import numpy as np
 from av.error import FFmpegError
+from numpy.typing import NDArray
 
 from facefolds_core.errors import UserError
 
@@ -59,6 +62,56 @@ def _within(frames: Iterable[Any], samples: int, rate: int, layout: str) -> Iter
             if count < samples:
                 yield part
             count += part.samples
+
+
+def write_film_with_sound(path: Path, film: Path, source: Path, sequence: Fraction, first: Fraction) -> None:
+    """`film`, a video in MP4 as it is, with the sound of the sequence that it shows, again and again.
+
+    Args:
+        source: the sound, as `encode_sound` writes it.
+        sequence: seconds of the sequence: what the sound has beyond them is not heard; after its own end it is still.
+        first: seconds of the sequence at which the film begins.
+    """
+    made_options = {"fflags": "bitexact", "movflags": "faststart"}
+    with av.open(f"file:{source}", container_options=STRICT | FORMATS) as given:
+        once, rate, layout = _heard_once(given, sequence)
+    with av.open(str(film)) as shown, av.open(str(path), "w", format="mp4", options=made_options) as made:
+        pictures: Any = shown.streams.video[0]
+        sound: Any = made.add_stream("aac", rate=rate, layout=layout)
+        sound.codec_context.bit_rate = AAC_BITS_A_SECOND
+        copied = made.add_stream_from_template(pictures)
+        packet: Any
+        samples, end = 0, 0
+        for packet in shown.demux(pictures):
+            if packet.dts is None:  # the flush at the end
+                continue
+            end = max(end, packet.pts + packet.duration)
+            packet.stream = copied
+            made.mux(packet)
+            while samples < end * pictures.time_base * rate:
+                made.mux(sound.encode(_part(once, samples, round(first * rate), rate, layout)))
+                samples += AAC_FRAME
+        made.mux(sound.encode(None))
+
+
+def _heard_once(given: Any, sequence: Fraction) -> tuple[NDArray[np.float32], int, str]:
+    """(channels, samples) of one sequence, samples a second, layout."""
+    stream = given.streams.audio[0]
+    rate, layout = stream.codec_context.sample_rate, "stereo" if stream.codec_context.channels > 1 else "mono"
+    samples = round(sequence * rate)
+    parts = [part.to_ndarray() for part in _within(given.decode(stream), samples, rate, layout)]
+    once = np.zeros((2 if layout == "stereo" else 1, samples), np.float32)
+    heard = np.concatenate(parts, 1)[:, :samples]
+    once[:, : heard.shape[1]] = heard
+    return once, rate, layout
+
+
+def _part(once: NDArray[np.float32], start: int, first: int, rate: int, layout: str) -> av.AudioFrame:
+    """The film's samples from `start` on, as many as the encoder takes at once."""
+    wanted = np.arange(first + start, first + start + AAC_FRAME) % once.shape[1]
+    frame = av.AudioFrame.from_ndarray(np.ascontiguousarray(once[:, wanted]), format="fltp", layout=layout)
+    frame.sample_rate, frame.pts, frame.time_base = rate, start, Fraction(1, rate)
+    return frame
 
 
 def sound_problem(path: Path, seconds: float) -> str | None:

@@ -18,6 +18,7 @@ from PIL import Image
 
 from facefolds_core.api.cameras import camera_named, cameras_of_asset
 from facefolds_core.asset import read_asset
+from facefolds_core.asset.audio import write_film_with_sound
 from facefolds_core.asset.codecs import CODECS
 from facefolds_core.asset.colour import rgb_to_yuv420
 from facefolds_core.asset.filmed import direction_of, swing_filmed, unfilmed_words
@@ -293,6 +294,7 @@ def command(
                 else:
                     due = (frame_due(i, rate, texture.rate, shown.num_frames, frame) for i in range(len(eyes)))
                     write_film(temporary, map(picture, eyes, due), (width, height), rate)
+                    add_sound(temporary, read, frame, texture.rate, shown.num_frames)
             typer.echo(f"render: {out} ({width} x {height}, {renderer.device})")
 
 
@@ -303,3 +305,11 @@ def write_film(path: Path, pictures: Iterator[NDArray[np.uint8]], size: tuple[in
     planar = (np.concatenate([y, cb.reshape(-1, width), cr.reshape(-1, width)]) for y, cb, cr in planes)
     codec = CODECS["h264"]
     encode_video(path, planar, size, rate, codec, codec.options(FILM, FILM.crf))
+
+
+def add_sound(film: Path, asset: Asset, frame: int, rate: Fraction, frames: int) -> None:
+    """The sequence's sound under a film that begins with `frame`, if the asset has one."""
+    if asset.manifest.audio is None:
+        return
+    with atomic_file(film) as temporary:
+        write_film_with_sound(temporary, film, asset.folder / asset.manifest.audio.file, frames / rate, frame / rate)

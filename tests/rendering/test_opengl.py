@@ -28,11 +28,12 @@ from facefolds_core.rendering.opengl import OpenGLRenderer
 from facefolds_core.rendering.opengl_reflection import Glossy
 from facefolds_core.rendering.pixels import render
 from facefolds_core.rendering.reflection import reflected_colours
+from tests.asset.test_audio import tone
 from tests.assets import SOURCE, make_asset
 from tests.engines.tracks import with_track
 from tests.pictures import psnr
 from tests.scenes import look_at_origin, view_of
-from tests.viewer.fixtures import add_reflection, change_manifest, random_reflection
+from tests.viewer.fixtures import add_reflection, change_manifest, file_entry, random_reflection
 
 
 @pytest.fixture(scope="module")
@@ -246,6 +247,8 @@ def test_a_films_camera_moves_more_often_than_the_sequence(
     tmp_path: Path, options: list[str], rate: float, count: int
 ) -> None:
     make_asset(tmp_path / "asset", frames=3, resolution=32, source=replace(SOURCE, fps=4.0))
+    sound = tone(tmp_path / "asset" / "audio.wav", 0.75)
+    change_manifest(tmp_path / "asset", lambda value: value.update(audio=file_entry(sound)))
     film = ["--kind", "turntable", "--size", "64x48", "--seconds", "1", "--out", tmp_path / "film.mp4"]
     done = run(tmp_path / "asset", *film, *options)
     assert done.exit_code == 0, done.output
@@ -254,6 +257,8 @@ def test_a_films_camera_moves_more_often_than_the_sequence(
         pictures = [frame.to_ndarray(format="rgb24") for frame in container.decode(video)]
         assert video.average_rate == rate and video.duration is not None and video.time_base is not None
         assert float(video.duration * video.time_base) == pytest.approx(1, abs=0.51 / rate)
+    with av.open(str(tmp_path / "film.mp4")) as container:
+        assert sum(frame.samples for frame in container.decode(audio=0)) == pytest.approx(48_000, abs=4800)
     assert len(pictures) == count and pictures[0].shape == (48, 64, 3)
     assert all((a != b).any() for a, b in pairwise(pictures))  # the camera moves in each
 
