@@ -1,7 +1,7 @@
 """How near an engine comes to the reference on an asset: the figures and pictures of docs/guide/engines.md.
 
 python -m tests.engines.agreement blender data/actor/asset --picture docs/images/blender.jpg
-python -m tests.engines.agreement model_viewer data/actor/asset      # or three: the GLB, after `make package`
+python -m tests.engines.agreement model_viewer data/actor/asset      # or three, babylon: the GLB, after `make package`
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ def in_the_web(level: AssetLevel, cameras: list[Camera], place: Path, viewer: gl
 
 
 def main(
-    engine: Annotated[Literal["blender", "godot", "usd", "three", "model_viewer"], typer.Argument()],
+    engine: Annotated[Literal["blender", "godot", "usd", "three", "babylon", "model_viewer"], typer.Argument()],
     asset: Annotated[Path, typer.Argument(help="Folder of the asset.")],
     size: Annotated[int, typer.Option(help="Pixels of a side.")] = 320,
     level: Annotated[str | None, typer.Option(help="Level of detail; the full one if left out.")] = None,
@@ -77,7 +77,7 @@ def main(
     """PSNR to the reference, five cameras, first, middle and last frame (GLB and USD: the first)."""
     whole = read_asset(asset)
     shown = pick_level(whole, level)
-    web = engine in ("three", "model_viewer")
+    web = engine in ("three", "babylon", "model_viewer")
     render: Callable[..., Found]
     if web:
         render = lambda level, cameras, _, place: in_the_web(level, cameras, place, engine)  # noqa: E731

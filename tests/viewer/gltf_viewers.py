@@ -1,4 +1,4 @@
-"""What the web's viewers of glTF show of a GLB as they come: three.js with its GLTFLoader, and model-viewer."""
+"""What the web's viewers of glTF show of a GLB as they come: three.js with its GLTFLoader, Babylon.js, model-viewer."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from tests.pictures import GREY
 from tests.scenes import view_of
 
 VIEWER = Path(__file__).parents[2] / "viewer"
-GltfViewer = Literal["three", "model_viewer", "layered_three", "layered_babylon"]
+GltfViewer = Literal["three", "babylon", "model_viewer", "layered_three", "layered_babylon"]
 
 
 def build(folder: Path, viewer: GltfViewer) -> None:

@@ -22,7 +22,7 @@ FRAME = 1
 LAYERS = 4
 
 
-@pytest.fixture(scope="module", params=["three", "model_viewer"])
+@pytest.fixture(scope="module", params=["three", "babylon", "model_viewer"])
 def viewer_folder(
     request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory, player_folder: Path
 ) -> Path:
