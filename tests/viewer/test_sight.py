@@ -125,7 +125,7 @@ def test_layers_that_are_pulled_apart_are_seen_from_aside_and_fill_the_canvas(
             player.button("Close the settings")
         else:
             player.run("e.spread = 1")
-    aside = 42 if size[0] > size[1] else 28
+    aside = 62 if size[0] > size[1] else 28
     player.wait(f"Math.abs(e.player.view.get().azimuth - {aside}) < 0.01")
     player.page.wait_for_timeout(500)
     corners = """const { view, renderer, size } = e.player; const { low, high } = renderer.bounds();

@@ -1,6 +1,6 @@
 /** The layers pulled apart, and the view that shows all of them. */
 
-const ASIDE = { azimuth: 42, elevation: 8 }; // degrees: from where layers that are pulled apart are seen
+const ASIDE = { azimuth: 62, elevation: 8 }; // degrees: from where layers that are pulled apart are seen
 const ACROSS = { azimuth: 28, elevation: 26 }; // the same where the canvas is tall: their row goes up the picture
 
 export class Apart {
