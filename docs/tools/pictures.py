@@ -51,7 +51,8 @@ PLAYER: dict[str, Any] = {"gap": 20, "width": 1600, "patience": 1500, "quality":
 SIZES: dict[str, Any] = {**PLAYER, "gap": 40, "width": 1200}
 PLAYER |= {"panes": [[1000, 660, "frame=4"], [1000, 660, "frame=0&spread=1"]]}
 PLAYER["panes"] += [[390, 660, "frame=0"]]
-SIZES |= {"panes": [[1440, 900, "frame=0"], [390, 844, "frame=0"], [360, 240, "frame=0"]]}
+SIZES["panes"] = [[1440, 900, "frame=0&background=white"], [390, 844, "frame=0&background=grey"]]
+SIZES["panes"] += [[360, 240, "frame=0&background=daylight"]]
 """CSS pixels of the windows, and what each shows, as in the player's links; the picture's width; milliseconds for what
 glides."""
 FULL = "document.querySelector('facefolds-player').level === 'full'"
