@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from facefolds_core.captures.actor import PERIOD, ActorOptions, Picture, camera_at, pose_at, render, tracked_mesh
-from facefolds_core.captures.actor.motion import BLINK
+from facefolds_core.captures.actor import ActorOptions, Picture, camera_at, render, tracked_mesh
+from facefolds_core.captures.actor.motion import BLINK, PERIOD, pose_at
 from facefolds_core.geometry.cameras import Camera
 
 TO_WORLD = np.diag([1.0, -1.0, -1.0])
@@ -37,10 +37,6 @@ def test_same_arguments_give_the_same_picture(rest: Picture) -> None:
     assert np.array_equal(rest.rgb, again.rgb)
     assert np.array_equal(rest.opacity, again.opacity)
     assert np.array_equal(rest.depth, again.depth)
-
-
-def test_seed_changes_skin_and_hair(rest: Picture) -> None:
-    assert not np.array_equal(rest.rgb, render(frontal(), 0.0, seed=1).rgb)
 
 
 def test_a_picture_has_colour_opacity_and_depth_and_the_room_none(rest: Picture) -> None:

@@ -5,23 +5,20 @@ product's rendering, so that one can judge the other. docs/guide/actor.md descri
 """
 
 from facefolds_core.captures.actor.capture import SEGMENT, frame_times, write_capture
-from facefolds_core.captures.actor.mesh import TrackedMesh, tracked_mesh
-from facefolds_core.captures.actor.motion import PERIOD, head_pose, pose_at
+from facefolds_core.captures.actor.mesh import tracked_mesh
+from facefolds_core.captures.actor.motion import head_pose
 from facefolds_core.captures.actor.render import ActorOptions, Picture, render
 from facefolds_core.captures.actor.rig import ActorRig, camera_at, make_rig
 
 __all__ = [
-    "PERIOD",
     "SEGMENT",
     "ActorOptions",
     "ActorRig",
     "Picture",
-    "TrackedMesh",
     "camera_at",
     "frame_times",
     "head_pose",
     "make_rig",
-    "pose_at",
     "render",
     "tracked_mesh",
     "write_capture",

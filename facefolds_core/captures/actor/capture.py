@@ -89,7 +89,7 @@ def write_capture(
 
     Args:
         folder: replaced if it exists.
-        params: cameras, frames, size, seed.
+        params: cameras, frames, size.
         progress: called after each of the cameras x frames pictures.
         options: see `ActorOptions`; by default as `params` have it.
         rig: other cameras than those of `make_rig`.
@@ -132,9 +132,7 @@ def speak(path: Path, seconds: float) -> bool:
         take[start : start + len(said)] = said
     path.parent.mkdir(parents=True, exist_ok=True)
     with wave.open(str(path), "wb") as out:
-        out.setnchannels(1)
-        out.setsampwidth(take.itemsize)
-        out.setframerate(rate)
+        out.setparams((1, take.itemsize, rate, 0, "NONE", ""))
         out.writeframes(np.resize(take, round(seconds * rate)).tobytes())
     return True
 

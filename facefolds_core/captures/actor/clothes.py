@@ -48,9 +48,9 @@ def shirt(x: float, y: float, z: float, cut: float) -> float:
 
 
 @compiled
-def shirt_paint(x: float, y: float, z: float, seed: int) -> Vector:
+def shirt_paint(x: float, y: float, z: float) -> Vector:
     """Knit; ribs around the collar, a darker seam along the lower edge."""
-    knit = 0.92 + 0.16 * value_noise(x / 2.5, y / 6.0, z / 2.5, seed + 51)
+    knit = 0.92 + 0.16 * value_noise(x / 2.5, y / 6.0, z / 2.5, 51)
     cut = bust(x, y, z)
     angle = math.atan2(x, z - _COLLAR_Z)
     collar = smoothstep(16.0, 8.0, abs(y - _COLLAR_Y + _COLLAR_TILT * (z - _COLLAR_Z)))

@@ -73,40 +73,40 @@ def _combed(x: float, y: float, z: float) -> tuple[float, float, float, float, f
 
 
 @compiled
-def _locks(a: float, b: float, along: float, r: float, away: float, seed: int) -> float:
+def _locks(a: float, b: float, along: float, r: float, away: float) -> float:
     """Noise of the width of a lock, in [0, 1]; even at the crown."""
-    return 0.62 + (value_noise(7.0 * a, 7.0 * b, 1.6 * along + 0.035 * r, seed + 11) - 0.62) * away
+    return 0.62 + (value_noise(7.0 * a, 7.0 * b, 1.6 * along + 0.035 * r, 11) - 0.62) * away
 
 
 @compiled
-def _strands(a: float, b: float, along: float, r: float, away: float, seed: int) -> float:
+def _strands(a: float, b: float, along: float, r: float, away: float) -> float:
     """Noise of the width of a strand, in [0, 1]."""
-    fine = value_noise(27.0 * a, 27.0 * b, 2.6 * along + 0.11 * r, seed + 12)
-    finest = value_noise(68.0 * a, 68.0 * b, 3.4 * along + 0.25 * r, seed + 13)
+    fine = value_noise(27.0 * a, 27.0 * b, 2.6 * along + 0.11 * r, 12)
+    finest = value_noise(68.0 * a, 68.0 * b, 3.4 * along + 0.25 * r, 13)
     return 0.5 + (0.75 * (fine - 0.5) + 0.55 * (finest - 0.5)) * away
 
 
 @compiled
-def roots(x: float, y: float, z: float, seed: int) -> float:
+def roots(x: float, y: float, z: float) -> float:
     """How much of the skin the roots of the hair hide, 0 to 1: strands end at the hairline, each a little elsewhere."""
     d = envelope(x, y, z)
     if d > 4.0 or d < -14.0:
         return 1.0 if d < 0.0 else 0.0
     a, b, along, r, away = _combed(x, y, z)
-    ragged = 7.0 * (_strands(a, b, along, r, away, seed) - 0.5) + 5.0 * (_locks(a, b, along, r, away, seed) - 0.5)
+    ragged = 7.0 * (_strands(a, b, along, r, away) - 0.5) + 5.0 * (_locks(a, b, along, r, away) - 0.5)
     return smoothstep(0.5, -5.0, d - ragged)
 
 
 @compiled
-def density(x: float, y: float, z: float, d: float, amount: float, seed: int) -> tuple[float, float, float]:
+def density(x: float, y: float, z: float, d: float, amount: float) -> tuple[float, float, float]:
     """Extinction per mm at a point, d mm from the outline, with what shading needs: (extinction, locks, strands)."""
     a, b, along, r, away = _combed(x, y, z)
-    locks = _locks(a, b, along, r, away, seed)
+    locks = _locks(a, b, along, r, away)
     inside = -(d + 6.0 * (locks - 0.45))
     body = smoothstep(-3.0, 13.0, inside)
     if body <= 0.0:
         return 0.0, locks, 0.5
-    fine = _strands(a, b, along, r, away, seed)
+    fine = _strands(a, b, along, r, away)
     # Near the outline only the thickest strands remain.
     cut = smoothstep(0.78 - 0.85 * body, 1.02 - 0.85 * body, fine)
     return amount * _FULL * body * cut, locks, fine
@@ -191,7 +191,6 @@ def march(
     lights: NDArray[np.float64],
     amount: float,
     gloss: float,
-    seed: int,
 ) -> tuple[float, float, float, float]:
     """Follow a ray through the hair from `near` to `far`: (red, green, blue) of the hair times its cover, and
     transmittance.
@@ -208,7 +207,7 @@ def march(
             t += 0.85 * (outside - _FRINGE)
             continue
         step = min(STEP * (2.2 - 1.2 * through), far - t)
-        extinction, locks, fine = density(x, y, z, outside, amount, seed)
+        extinction, locks, fine = density(x, y, z, outside, amount)
         if extinction <= 1e-4:
             step = 1.4 * STEP
         else:

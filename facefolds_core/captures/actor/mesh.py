@@ -46,8 +46,9 @@ def _cut(origins: Array, directions: Array, pose: Array, far: float) -> Array:
     """Distances (V,) along rays (V, 3), head mm, to the first crossing."""
     hits = np.empty(len(origins))
     for i in prange(len(origins)):
-        o, d = origins[i], directions[i]
-        hits[i] = trace(o[0], o[1], o[2], d[0], d[1], d[2], 0.0, far, pose)
+        o = (origins[i, 0], origins[i, 1], origins[i, 2])
+        d = (directions[i, 0], directions[i, 1], directions[i, 2])
+        hits[i] = trace(o, d, 0.0, far, pose)
     return hits
 
 

@@ -145,7 +145,6 @@ def _sample(
     pose: Array,
     lights: Array,
     settings: Array,
-    seed: int,
 ) -> tuple[float, float, float, float, float]:
     """One ray through continuous image coordinates (u, v): colour, opacity, depth of the surface (inf for none).
 
@@ -157,19 +156,19 @@ def _sample(
     hit = math.inf
     if starts[0] < math.inf:
         _, far = span(o, d, AROUND, RADIUS, 0.0)
-        hit = trace(o[0], o[1], o[2], d[0], d[1], d[2], starts[0], far, pose)
+        hit = trace(o, d, starts[0], far, pose)
     red, green, blue, through = 0.0, 0.0, 0.0, 1.0
     if starts[1] < hit:
-        red, green, blue, through = march(o, d, starts[1], hit, lights, amount, gloss, seed)
+        red, green, blue, through = march(o, d, starts[1], hit, lights, amount, gloss)
     if through <= 0.0:
         return red, green, blue, 1.0, hit / length
     if hit < math.inf:
         p = (o[0] + hit * d[0], o[1] + hit * d[1], o[2] + hit * d[2])
         _, material = surface(p[0], p[1], p[2], pose)
         n = normal(p[0], p[1], p[2], pose)
-        r, g, bl = surface_colour(p, n, (-d[0], -d[1], -d[2]), material, pose, lights, gloss, seed)
+        r, g, bl = surface_colour(p, n, (-d[0], -d[1], -d[2]), material, pose, lights, gloss)
         return red + through * r, green + through * g, blue + through * bl, 1.0, hit / length
-    r, g, bl = room_colour(centre[0], centre[1], centre[2], w[0], w[1], w[2], colourfulness, clutter)
+    r, g, bl = room_colour((centre[0], centre[1], centre[2]), w, colourfulness, clutter)
     return red + through * r, green + through * g, blue + through * bl, 1.0 - through, math.inf
 
 
@@ -195,7 +194,6 @@ def _render_samples(
     pose: Array,
     lights: Array,
     settings: Array,
-    seed: int,
 ) -> tuple[NDArray[np.uint8], NDArray[np.float32], NDArray[np.float32]]:
     """Anti-aliased rgb (H, W, 3) and opacity (H, W), and depth (H, W) at pixel centres."""
     starts = np.empty(((height - 1) // _TILE + 1, (width - 1) // _TILE + 1, 2))
@@ -206,7 +204,7 @@ def _render_samples(
     for i in prange(height):
         for j in range(width):
             start = (starts[i // _TILE, j // _TILE, 0], starts[i // _TILE, j // _TILE, 1])
-            r, g, b, a, t = _sample(j + 0.5, i + 0.5, start, to_world, centre, frame, pose, lights, settings, seed)
+            r, g, b, a, t = _sample(j + 0.5, i + 0.5, start, to_world, centre, frame, pose, lights, settings)
             first[i, j, 0], first[i, j, 1], first[i, j, 2] = min(r, 1.0), min(g, 1.0), min(b, 1.0)
             first[i, j, 3], first[i, j, 4] = a, t
     rgb = np.empty((height, width, 3), np.uint8)
@@ -221,7 +219,7 @@ def _render_samples(
                     # A triangle about the centre, turned so that no two samples share a row or a column.
                     angle = 2.0 * math.pi * (k / 3.0 + 0.04)
                     u, v = j + 0.5 + 0.38 * math.cos(angle), i + 0.5 + 0.38 * math.sin(angle)
-                    r, g, b, a, _ = _sample(u, v, start, to_world, centre, frame, pose, lights, settings, seed)
+                    r, g, b, a, _ = _sample(u, v, start, to_world, centre, frame, pose, lights, settings)
                     smooth[0] += min(r, 1.0)
                     smooth[1] += min(g, 1.0)
                     smooth[2] += min(b, 1.0)
@@ -233,18 +231,17 @@ def _render_samples(
     return rgb, opacity, depth
 
 
-def render(camera: Camera, time: float, options: ActorOptions | None = None, seed: int = 0) -> Picture:
+def render(camera: Camera, time: float, options: ActorOptions | None = None) -> Picture:
     """The actor as a camera sees it.
 
     Args:
         camera: in the capture's world (mm, head near z = 1000), continuous image coordinates.
         time: seconds; any, also between frames; periodic in `motion.PERIOD`.
         options: see `ActorOptions`.
-        seed: of skin, hair and freckles.
     """
     options = options or ActorOptions()
     if options.shutter > 0:
-        return _exposed(camera, time, options, seed)
+        return _exposed(camera, time, options)
     rotation, translation = head_pose(time, options.head_motion)
     frame = np.concatenate([rotation, (translation + options.away * _UP)[:, None]], 1)
     pose = pose_at(time)
@@ -263,16 +260,15 @@ def render(camera: Camera, time: float, options: ActorOptions | None = None, see
         pose,
         lights,
         settings,
-        seed,
     )
     return Picture(rgb, opacity, depth)
 
 
-def _exposed(camera: Camera, time: float, options: ActorOptions, seed: int) -> Picture:
+def _exposed(camera: Camera, time: float, options: ActorOptions) -> Picture:
     """The mean of EXPOSURES sharp pictures, evenly spread over the time that the shutter is open; depth at `time`."""
     sharp = replace(options, shutter=0.0)
     times = time + options.shutter * (np.arange(EXPOSURES) / (EXPOSURES - 1) - 0.5)
-    pictures = [render(camera, float(t), sharp, seed) for t in times]
+    pictures = [render(camera, float(t), sharp) for t in times]
     return Picture(
         rgb=np.rint(np.mean([p.rgb for p in pictures], 0)).astype(np.uint8),
         opacity=np.mean([p.opacity for p in pictures], 0).astype(np.float32),

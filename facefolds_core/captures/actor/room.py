@@ -105,17 +105,16 @@ def _ceiling(u: float, v: float) -> Vector:
 
 
 @compiled
-def room_colour(
-    ox: float, oy: float, oz: float, dx: float, dy: float, dz: float, colourfulness: float, clutter: float
-) -> Vector:
+def room_colour(o: Vector, d: Vector, colourfulness: float, clutter: float) -> Vector:
     """Colour of the wall that a ray meets from inside the room.
 
     Args:
-        ox, oy, oz: origin, world mm.
-        dx, dy, dz: direction.
+        o: origin, world mm.
+        d: direction.
         colourfulness: 1 as painted, 0 grey.
         clutter: 0 as painted, 1 hung with tiles of random colours.
     """
+    (ox, oy, oz), (dx, dy, dz) = o, d
     tx = ((_RIGHT if dx > 0 else _LEFT) - ox) / dx if abs(dx) > 1e-9 else math.inf
     ty = ((_FLOOR if dy > 0 else _CEILING) - oy) / dy if abs(dy) > 1e-9 else math.inf
     tz = ((_BACK if dz > 0 else _FRONT) - oz) / dz if abs(dz) > 1e-9 else math.inf

@@ -32,16 +32,16 @@ from facefolds_core.kernels.jit import compiled
 
 
 @compiled
-def _freckles(x: float, y: float, z: float, seed: int) -> float:
+def _freckles(x: float, y: float, z: float) -> float:
     """Darkness of freckles in [0, 1]: at most one dot a cell of 4.5 mm."""
     cell = 4.5
     i, j, k = math.floor(x / cell), math.floor(y / cell), math.floor(z / cell)
-    if hash3(i, j, k, seed + 21) > 0.34:
+    if hash3(i, j, k, 21) > 0.34:
         return 0.0
-    dx = x / cell - i - 0.3 - 0.4 * hash3(i, j, k, seed + 22)
-    dy = y / cell - j - 0.3 - 0.4 * hash3(i, j, k, seed + 23)
-    dz = z / cell - k - 0.3 - 0.4 * hash3(i, j, k, seed + 24)
-    size = 0.14 + 0.18 * hash3(i, j, k, seed + 25)
+    dx = x / cell - i - 0.3 - 0.4 * hash3(i, j, k, 22)
+    dy = y / cell - j - 0.3 - 0.4 * hash3(i, j, k, 23)
+    dz = z / cell - k - 0.3 - 0.4 * hash3(i, j, k, 24)
+    size = 0.14 + 0.18 * hash3(i, j, k, 25)
     return smoothstep(size, 0.5 * size, math.sqrt(dx * dx + dy * dy + dz * dz))
 
 
@@ -59,7 +59,7 @@ def lip_mask(xr: float, yr: float) -> float:
 
 
 @compiled
-def brow_mask(xr: float, yr: float, zr: float, brow: float, seed: int) -> float:
+def brow_mask(xr: float, yr: float, zr: float, brow: float) -> float:
     """Density of the eyebrow, 0 to 1."""
     ax = abs(xr)
     s = (ax - 12.0) / 37.0
@@ -69,18 +69,18 @@ def brow_mask(xr: float, yr: float, zr: float, brow: float, seed: int) -> float:
     halfwidth = 3.6 * (1.0 - 0.62 * s)
     across = abs(yr - centre) / max(halfwidth, 0.3)
     # Hairs lean outwards.
-    hairs = value_noise((ax - 0.6 * (yr - centre)) / 1.1, yr / 4.0, 0.5, seed + 31)
+    hairs = value_noise((ax - 0.6 * (yr - centre)) / 1.1, yr / 4.0, 0.5, 31)
     fade = smoothstep(1.25, 0.55, across) * smoothstep(-0.08, 0.1, s) * smoothstep(1.08, 0.85, s)
     return fade * (0.62 + 0.38 * hairs)
 
 
 @compiled
-def _skin_paint(x: float, y: float, z: float, pose: NDArray[np.float64], seed: int) -> tuple[Vector, float]:
+def _skin_paint(x: float, y: float, z: float, pose: NDArray[np.float64]) -> tuple[Vector, float]:
     """Albedo of the skin at a point of the moving head, and its gloss."""
     xr, yr, zr = to_rest(x, y, z, pose)
     ax = abs(xr)
-    broad = value_noise(xr / 17.0, yr / 17.0, zr / 17.0, seed + 1) - 0.5
-    fine = value_noise(xr / 3.1, yr / 3.1, zr / 3.1, seed + 2) - 0.5
+    broad = value_noise(xr / 17.0, yr / 17.0, zr / 17.0, 1) - 0.5
+    fine = value_noise(xr / 3.1, yr / 3.1, zr / 3.1, 2) - 0.5
     tone = 1.0 + 0.07 * broad + 0.07 * fine
     colour = (0.90 * tone, 0.67 * tone, 0.545 * tone)
     gloss = 0.30 + 0.25 * fine
@@ -94,14 +94,14 @@ def _skin_paint(x: float, y: float, z: float, pose: NDArray[np.float64], seed: i
         colour = mix(colour, (0.66, 0.42, 0.36), 0.26 * around)
         gloss += 0.30 * math.exp(-((ax / 9.0) ** 2)) * smoothstep(-48.0, -30.0, yr)
         where = math.exp(-(((yr + 24.0) / 22.0) ** 2)) * smoothstep(64.0, 40.0, ax)
-        dots = _freckles(xr, yr, zr, seed) * (0.08 + 0.40 * where)
+        dots = _freckles(xr, yr, zr) * (0.08 + 0.40 * where)
         colour = mix(colour, (0.50, 0.27, 0.17), dots)
-        brow = brow_mask(xr, yr, zr, pose[BROW], seed)
+        brow = brow_mask(xr, yr, zr, pose[BROW])
         colour = mix(colour, (0.17, 0.095, 0.055), 0.92 * brow)
         gloss *= 1.0 - 0.7 * brow
     if zr > 40.0 and yr < -40.0:
         lip = lip_mask(xr, yr)
-        wrinkle = value_noise(xr / 1.3, yr / 7.0, 0.5, seed + 3)
+        wrinkle = value_noise(xr / 1.3, yr / 7.0, 0.5, 3)
         colour = mix(colour, (0.70 + 0.06 * wrinkle, 0.35, 0.32), 0.74 * lip)
         gloss += 0.40 * lip * (0.5 + wrinkle)
         height, edge, _ = mouth_gap(x, pose)
@@ -118,7 +118,7 @@ def _skin_paint(x: float, y: float, z: float, pose: NDArray[np.float64], seed: i
     nostril = math.exp(-(((ax - 6.2) / 3.0) ** 2) - ((yr + 45.5) / 1.8) ** 2) * smoothstep(85.0, 88.0, zr)
     nostril *= smoothstep(98.0, 95.0, zr)
     colour = mix(colour, (0.20, 0.07, 0.05), 0.9 * clamp(1.4 * nostril, 0.0, 1.0))
-    scalp = roots(x, y, z, seed)
+    scalp = roots(x, y, z)
     return mix(colour, (0.17, 0.10, 0.06), 0.9 * scalp), gloss * (1.0 - scalp)
 
 
@@ -138,7 +138,7 @@ def _lid_paint(ex: float, y: float, blink: float, colour: Vector, gloss: float) 
 
 
 @compiled
-def _eye_paint(x: float, y: float, z: float, pose: NDArray[np.float64], seed: int) -> Vector:
+def _eye_paint(x: float, y: float, z: float, pose: NDArray[np.float64]) -> Vector:
     """Sclera, iris with fibres, pupil; darker under the upper lid."""
     side = 1.0 if x > 0 else -1.0
     ex, ey, ez = (x - side * EYE_X) / EYE_RADIUS, y / EYE_RADIUS, (z - EYE_Z) / EYE_RADIUS
@@ -151,7 +151,7 @@ def _eye_paint(x: float, y: float, z: float, pose: NDArray[np.float64], seed: in
     colour = mix((0.90, 0.875, 0.85), (0.80, 0.58, 0.53), smoothstep(6.0, 14.0, abs(temple)))
     if radius < 7.8:
         angle = math.atan2(uy, ux)
-        fibre = value_noise(3.0 * math.cos(angle) * 3.0, 3.0 * math.sin(angle) * 3.0, radius / 3.0, seed + 41)
+        fibre = value_noise(3.0 * math.cos(angle) * 3.0, 3.0 * math.sin(angle) * 3.0, radius / 3.0, 41)
         iris = mix((0.50, 0.36, 0.16), (0.16, 0.36, 0.40), smoothstep(2.4, 4.6, radius + 1.2 * fibre))
         light = 0.75 + 0.6 * fibre
         iris = (iris[0] * light, iris[1] * light, iris[2] * light)
@@ -174,19 +174,17 @@ def _teeth_paint(x: float, y: float, z: float) -> Vector:
 
 
 @compiled
-def paint(
-    x: float, y: float, z: float, material: int, pose: NDArray[np.float64], seed: int
-) -> tuple[Vector, float, float]:
+def paint(x: float, y: float, z: float, material: int, pose: NDArray[np.float64]) -> tuple[Vector, float, float]:
     """(albedo, strength of the gloss, its exponent) at a point of a material."""
     if material == SKIN:
-        colour, gloss = _skin_paint(x, y, z, pose, seed)
+        colour, gloss = _skin_paint(x, y, z, pose)
         return colour, gloss, 26.0
     if material == EYE:
-        return _eye_paint(x, y, z, pose, seed), 2.6, 260.0
+        return _eye_paint(x, y, z, pose), 2.6, 260.0
     if material == TEETH:
         return _teeth_paint(x, y, z), 0.6, 60.0
     if material == SHIRT:
-        return shirt_paint(x, y, z, seed), 0.05, 10.0
+        return shirt_paint(x, y, z), 0.05, 10.0
     if material == PROP:
         stripe = smoothstep(-0.3, 0.3, math.sin(0.45 * (x + y)))
         return mix((0.82, 0.68, 0.16), (0.14, 0.34, 0.30), stripe), 0.1, 20.0
@@ -226,7 +224,6 @@ def surface_colour(
     pose: NDArray[np.float64],
     lights: NDArray[np.float64],
     gloss: float,
-    seed: int,
 ) -> Vector:
     """Colour of an opaque point towards the eye: wrapped diffuse, Blinn-Phong gloss, occlusion, the key light's shadow.
 
@@ -237,7 +234,7 @@ def surface_colour(
         lights: (L, 6) unit direction to the light, colour; the first one casts shadows.
         gloss: factor on every gloss.
     """
-    albedo, shine, exponent = paint(p[0], p[1], p[2], material, pose, seed)
+    albedo, shine, exponent = paint(p[0], p[1], p[2], material, pose)
     open_sky = occlusion(p[0], p[1], p[2], n, pose)
     under_hair = 0.55 + 0.45 * smoothstep(-4.0, 8.0, envelope(p[0], p[1], p[2]))
     # Light scattered in skin reddens where it grazes.

@@ -270,23 +270,21 @@ def reach(o: Vector, d: Vector, spread: float, pose: NDArray[np.float64]) -> flo
 
 
 @compiled
-def trace(
-    ox: float, oy: float, oz: float, dx: float, dy: float, dz: float, near: float, far: float, pose: NDArray[np.float64]
-) -> float:
-    """Distance along the unit ray to the first crossing of the surface, inf where there is none before `far`.
+def trace(o: Vector, d: Vector, near: float, far: float, pose: NDArray[np.float64]) -> float:
+    """Distance along the unit ray (o, d) to the first crossing of the surface, inf where there is none before `far`.
 
     Sphere tracing; close to the surface the last two distances tell how steeply the ray meets it, and the next step
     goes where the line through them is zero: half as many steps. From below the surface it steps back, once.
     """
     t, step, before, turned = near, 0.0, 0.0, False
     for _ in range(160):
-        d = distance(ox + t * dx, oy + t * dy, oz + t * dz, pose)
-        if d < 0.03 and (d > -0.03 or turned):
+        gap = distance(o[0] + t * d[0], o[1] + t * d[1], o[2] + t * d[2], pose)
+        if gap < 0.03 and (gap > -0.03 or turned):
             return t
-        turned |= d < 0.0
-        slope = (before - d) / step if step != 0.0 else 9.0
-        step = d * (0.97 if d > 12.0 else 0.8) if d > 3.0 or slope > 1.25 else d / max(slope, 0.4)
-        before = d
+        turned |= gap < 0.0
+        slope = (before - gap) / step if step != 0.0 else 9.0
+        step = gap * (0.97 if gap > 12.0 else 0.8) if gap > 3.0 or slope > 1.25 else gap / max(slope, 0.4)
+        before = gap
         t += step
         if t > far:
             break
