@@ -16,7 +16,7 @@ from facefolds_core.captures import actor
 from facefolds_core.captures.actor import ActorOptions, ActorRig, camera_at, make_rig, write_capture
 from facefolds_core.captures.assembly import plan_scene, write_plan
 from facefolds_core.captures.scene import Scene, Split, read_scene, write_scene
-from facefolds_core.captures.sources.multiface import read_multiface
+from facefolds_core.captures.sources import multiface
 from facefolds_core.config.source_code import digest_of_file
 from facefolds_core.files.frame_store import Image, write_frames
 from facefolds_core.files.writing import atomic_folder
@@ -69,10 +69,11 @@ def shoot(film: Film, cache: Path) -> Shots:
         params = CaptureParams(cameras=film.cameras, frames=film.frames, height=film.height, width=film.width)
         extremes = [camera_at(name, a, EXTREME_ELEVATION, film.width, film.height) for name, a in EXTREMES.items()]
         rig = make_rig(params).cameras
-        subject = Subject(source="actor", path="", holdout=tuple(c.name for c in [*rig[11::12], *extremes]))
+        held = tuple(camera.name for camera in [*rig[11::12], *extremes])
+        subject = Subject(source="actor", path="", holdout=held, fps=params.frame_rate)
         with TemporaryDirectory() as raw:
             write_capture(raw, params, options=film.options, rig=ActorRig((*rig, *extremes)))
-            capture = read_multiface(Path(raw), subject, params.frame_rate)
+            capture = multiface.read(Path(raw), subject)
             write_plan(plan_scene(capture, "actor", subject, PLAN, folder), PLAN)
     return read_shots(folder)
 

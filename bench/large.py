@@ -23,7 +23,7 @@ from bench.run import Project
 from bench.tables import markdown
 from bench.takes import Watched, watched
 from facefolds_core.captures.gathering import Calibration
-from facefolds_core.captures.krt import read_krt
+from facefolds_core.captures.sources.multiface import read_krt
 from facefolds_core.errors import report_user_errors
 from facefolds_core.files.writing import write_json, write_text
 from facefolds_core.params import STAGE_SECTIONS, merged

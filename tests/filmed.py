@@ -95,7 +95,7 @@ class Reader:
 
     def __call__(self, root: Path, **keys: object) -> Capture:
         subject = Subject(source=self.source, path="x", **{**self.given, **keys})  # type: ignore[arg-type]
-        capture: Capture = SOURCES[self.source].read(root, subject, CaptureParams())
+        capture: Capture = SOURCES[self.source].read(root, subject)
         return capture
 
     def refused(self, root: Path, message: str, *words: object, **keys: object) -> None:
@@ -115,7 +115,7 @@ def scene_of(root: Path, source: str, folder: Path, names: tuple[str, ...], **su
     """
     keys = {"holdout": (names[HELD_OUT],), "front": names[FRONT], **subject}
     entry = Subject(source=source, path=str(root), **keys)  # type: ignore[arg-type]
-    capture = SOURCES[source].read(root, entry, CaptureParams())
+    capture = SOURCES[source].read(root, entry)
     params = NormalizeParams()
     return write_plan(plan_scene(capture, "filmed", entry, params, folder), params)
 

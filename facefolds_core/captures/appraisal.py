@@ -16,7 +16,7 @@ from facefolds_core.captures.gathering import Recognised
 from facefolds_core.captures.looking import describe, look
 from facefolds_core.errors import UserError
 from facefolds_core.facts import Fact, shorten
-from facefolds_core.params import CaptureParams, FrameRange, HoldoutEvery, NormalizeParams, Subject
+from facefolds_core.params import FrameRange, HoldoutEvery, NormalizeParams, Subject
 from facefolds_core.registry import SOURCES
 
 HEADERS = 3
@@ -45,9 +45,9 @@ def _of(source: str, said: Recognised) -> Iterator[str]:
     keys: dict[str, Any] = dict(said.keys)
     subject = Subject(source=source, path=str(said.path.resolve()), **keys)
     try:
-        capture: Capture = SOURCES[source].read(said.path, subject, CaptureParams())
+        capture: Capture = SOURCES[source].read(said.path, subject)
         some = subject.model_copy(update={"frames": FrameRange(stop=HEADERS), "holdout": ()})
-        few: Capture = SOURCES[source].read(said.path, some, CaptureParams())
+        few: Capture = SOURCES[source].read(said.path, some)
         few = replace(few, left_out=capture.left_out)
         plan = plan_scene(few, "subject", some, NormalizeParams(), Path("scene"))
     except UserError as error:

@@ -10,7 +10,7 @@ import pytest
 
 from bench.large import enlarge, enlarged_krt
 from facefolds_core.captures.gathering import Calibration, scaled_intrinsics
-from facefolds_core.captures.krt import read_krt
+from facefolds_core.captures.sources.multiface import read_krt
 
 K = np.array([[500.0, 0, 63.5], [0, 510, 40], [0, 0, 1]])
 W2C = np.eye(3, 4)

@@ -16,7 +16,7 @@ from PIL import Image as Pillow
 
 from facefolds_core.captures.assembly import Plan, plan_scene
 from facefolds_core.geometry.cameras import Camera
-from facefolds_core.params import CaptureParams, NormalizeParams, Subject
+from facefolds_core.params import NormalizeParams, Subject
 from facefolds_core.registry import SOURCES
 
 Array = NDArray[np.float64]
@@ -98,7 +98,7 @@ def save_wav(path: Path, samples: NDArray[Any], rate: int) -> None:
 def plan_of(root: Path, params: NormalizeParams | None = None, source: str = "multiface", **keys: Any) -> Plan:
     """What `normalize` would make of a capture, in `scene` beside it; `keys` are the subject's."""
     subject = Subject(source=source, path=str(root), **{"holdout": ("400003",), "front": "400003", **keys})
-    capture = SOURCES[source].read(root, subject, CaptureParams())
+    capture = SOURCES[source].read(root, subject)
     return plan_scene(capture, "head", subject, params or NormalizeParams(), root.parent / "scene")
 
 

@@ -67,7 +67,7 @@ def test_a_rig_that_is_even_all_around_tells_nothing() -> None:
 @pytest.mark.parametrize("name", ["mugsy", "studio"])
 def test_the_front_of_real_rigs_is_found_without_their_meshes(captures_folder: Path, name: str) -> None:
     subject = Subject(source="multiface", path="x")
-    capture = SOURCES["multiface"].read(captures_folder / name, subject, CaptureParams())
+    capture = SOURCES["multiface"].read(captures_folder / name, subject)
     truth, _ = normalizing_similarity(capture, None)
     without, notes = normalizing_similarity(replace(capture, tracking=None), None)
     assert degrees(without.rotation[0], truth.rotation[0]) < 10
@@ -76,9 +76,7 @@ def test_the_front_of_real_rigs_is_found_without_their_meshes(captures_folder: P
 
 @pytest.mark.captures
 def test_the_foxs_front_is_found_and_a_manual_one_wins(captures_folder: Path) -> None:
-    capture = SOURCES["transforms"].read(
-        captures_folder / "fox", Subject(source="transforms", path="x"), CaptureParams()
-    )
+    capture = SOURCES["transforms"].read(captures_folder / "fox", Subject(source="transforms", path="x"))
     given, notes = normalizing_similarity(capture, "0019")
     assert not notes
     camera = next(view.camera for view in capture.views if view.name == "0019")

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from facefolds_core.captures.krt import read_krt
 from facefolds_core.captures.picture import FilePicture
+from facefolds_core.captures.sources.multiface import read_krt
 from facefolds_core.captures.tracked import read_obj
 from facefolds_core.params import FrameRange
 from tests.captures.fixtures import (

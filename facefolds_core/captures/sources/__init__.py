@@ -2,11 +2,10 @@
 
 A module has
 
-    def read(root: Path, subject: Subject, params: CaptureParams) -> Capture
+    def read(root: Path, subject: Subject) -> Capture
 
-which reads everything but the pixels, or raises `UserError`. `params` are the embedded actor's. Those of
-`captures.generated` read what the stage `capture` has made; all others read the folder or file that `path` names, and
-have
+which reads everything but the pixels, or raises `UserError`. Those of `captures.generated` read what the stage
+`capture` has made; all others read the folder or file that `path` names, and have
 
     def recognise(root: Path) -> Recognised | None
 
@@ -27,13 +26,17 @@ from facefolds_core.registry import SOURCES
 def read_capture(subject: Subject, folders: SubjectFolders, params: CaptureParams) -> Capture:
     """The capture of any source.
 
+    Args:
+        params: at whose rate a generated capture was made.
+
     Raises:
         UserError: if its place is none that may be read, or what is there is damaged.
     """
     if is_generated(subject.source):
         place = folders.capture
+        subject = subject.model_copy(update={"fps": subject.fps or params.frame_rate})
     else:
         place = check_place(subject.path, folders, "path")
         check_layout(subject.source, place)
-    capture: Capture = SOURCES[subject.source].read(place, subject, params)
+    capture: Capture = SOURCES[subject.source].read(place, subject)
     return capture

@@ -28,7 +28,7 @@ from facefolds_core.captures.picture import Picture
 from facefolds_core.errors import UserError
 from facefolds_core.files.reading import is_regular, read_text
 from facefolds_core.geometry.cameras import HUGE
-from facefolds_core.params import CaptureParams, Subject
+from facefolds_core.params import Subject
 
 FPS = 25.0
 PIXEL_CENTRES = 0.5
@@ -47,7 +47,7 @@ def recognise(root: Path) -> Recognised | None:
     return Recognised(what, found[0])
 
 
-def read(root: Path, subject: Subject, params: CaptureParams) -> Capture:
+def read(root: Path, subject: Subject) -> Capture:
     """Of the folder with calibration.csv."""
     path = root / "calibration.csv"
     calibrations = _table(path)

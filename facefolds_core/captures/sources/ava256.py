@@ -35,7 +35,7 @@ from facefolds_core.facts import Fact, fact, shorten
 from facefolds_core.files.reading import check_folder, check_regular, is_regular, read_text
 from facefolds_core.files.writing import read_json
 from facefolds_core.geometry.cameras import HUGE
-from facefolds_core.params import CaptureParams, Subject
+from facefolds_core.params import Subject
 
 FULL_SIZE = (2668, 4096)
 FPS = 30.0
@@ -58,7 +58,7 @@ def recognise(root: Path) -> Recognised | None:
     return None
 
 
-def read(root: Path, subject: Subject, params: CaptureParams) -> Capture:
+def read(root: Path, subject: Subject) -> Capture:
     """Of the folder with camera_calibration.json; `segment` of the subject is a seg_id of frame_list.csv."""
     check_folder(root, _MISSING)
     calibrations = _calibrations(root / "camera_calibration.json")

@@ -36,7 +36,7 @@ from facefolds_core.errors import UserError
 from facefolds_core.facts import Fact, fact, shorten
 from facefolds_core.files.parsing import parse_yaml
 from facefolds_core.files.reading import is_regular, read_text
-from facefolds_core.params import CaptureParams, Subject
+from facefolds_core.params import Subject
 
 FPS = 30.0
 PIXEL_CENTRES = 0.0
@@ -62,7 +62,7 @@ class MaskFile(FilePicture):
         return np.where(values > 0, 255, 0).astype(np.uint8) if values.max() <= _LABELS else values
 
 
-def read(root: Path, subject: Subject, params: CaptureParams) -> Capture:
+def read(root: Path, subject: Subject) -> Capture:
     """Of the folder with intri.yml and extri.yml."""
     intri = read_storage(root / "intri.yml", _MISSING)
     extri = read_storage(root / "extri.yml", _MISSING)

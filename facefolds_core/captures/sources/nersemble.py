@@ -51,7 +51,7 @@ from facefolds_core.errors import UserError
 from facefolds_core.facts import Fact, fact, shorten
 from facefolds_core.files.reading import check_folder, check_regular, is_folder, is_regular
 from facefolds_core.files.writing import read_json
-from facefolds_core.params import CaptureParams, Subject
+from facefolds_core.params import Subject
 
 FULL_SIZE = (2200, 3208)
 FPS = 73.0
@@ -72,7 +72,7 @@ def recognise(root: Path) -> Recognised | None:
     return Recognised(f"a NeRSemble participant, sequences {shorten(names)}", root, keys)
 
 
-def read(root: Path, subject: Subject, params: CaptureParams) -> Capture:
+def read(root: Path, subject: Subject) -> Capture:
     """Of a participant's folder; `segment` of the subject is the sequence."""
     check_folder(root, _MISSING)
     sequence = chosen_segment(_sequences(root), subject.segment, root / "sequences", _MISSING, "sequence")

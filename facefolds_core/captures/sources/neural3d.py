@@ -25,7 +25,7 @@ from facefolds_core.errors import UserError
 from facefolds_core.facts import shorten
 from facefolds_core.files.reading import is_regular
 from facefolds_core.geometry.cameras import HUGE
-from facefolds_core.params import CaptureParams, Subject
+from facefolds_core.params import Subject
 
 PIXEL_CENTRES = 0.5
 """The principal point is half the width: continuous coordinates."""
@@ -39,7 +39,7 @@ def recognise(root: Path) -> Recognised | None:
     return Recognised("a scene of Neural 3D Video", root, {"holdout": [next(iter(_videos(root)))]})
 
 
-def read(root: Path, subject: Subject, params: CaptureParams) -> Capture:
+def read(root: Path, subject: Subject) -> Capture:
     """Of the folder with poses_bounds.npy and the videos."""
     path = root / "poses_bounds.npy"
     rows = read_npy(path, "point `path` at the folder that holds poses_bounds.npy")

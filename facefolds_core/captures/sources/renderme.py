@@ -34,7 +34,7 @@ from facefolds_core.captures.picture import Hdf5Picture, Picture, open_hdf5
 from facefolds_core.errors import UserError
 from facefolds_core.facts import shorten
 from facefolds_core.files.reading import is_folder, is_regular
-from facefolds_core.params import CaptureParams, Subject
+from facefolds_core.params import Subject
 
 Array = NDArray[np.float64]
 
@@ -55,7 +55,7 @@ def recognise(root: Path) -> Recognised | None:
     return Recognised(what, root, {"segment": first} if len(found) > 1 else {})
 
 
-def read(root: Path, subject: Subject, params: CaptureParams) -> Capture:
+def read(root: Path, subject: Subject) -> Capture:
     """Of an .smc file, or a folder of them, of whose performances `segment` of the subject chooses one."""
     files = _files(root, subject.segment)
     calibrated = []

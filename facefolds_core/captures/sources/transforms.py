@@ -30,7 +30,7 @@ from facefolds_core.facts import fact, shorten
 from facefolds_core.files.reading import is_folder, is_regular, is_there
 from facefolds_core.files.writing import read_json
 from facefolds_core.geometry.cameras import HUGE, Camera, check_camera
-from facefolds_core.params import CaptureParams, Subject
+from facefolds_core.params import Subject
 
 Array = NDArray[np.float64]
 
@@ -88,7 +88,7 @@ def recognise(root: Path) -> Recognised | None:
     return Recognised(f"a capture of nerfstudio or instant-ngp in {len(parts)} parts", chosen)
 
 
-def read(root: Path, subject: Subject, params: CaptureParams) -> Capture:
+def read(root: Path, subject: Subject) -> Capture:
     """Of the folder with transforms.json, or of that file."""
     path = root if root.suffix == ".json" and not is_folder(root) else root / "transforms.json"
     remedy = "point `path` at the folder that holds transforms.json, or make the file again"

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from facefolds_core.captures.colmap_model import MODELS
 from facefolds_core.captures.sources import colmap
 from facefolds_core.geometry.cameras import Camera
 from tests.captures.fixtures import pattern, save
@@ -18,7 +17,7 @@ from tests.filmed import Reader, check_same, film, moved, scene_of
 read = Reader("colmap")
 
 Array = NDArray[np.float64]
-NUMBERS = {name: number for number, (name, _) in MODELS.items()}
+NUMBERS = {name: number for number, (name, _) in colmap.MODELS.items()}
 
 
 def quaternion(R: Array) -> list[float]:
