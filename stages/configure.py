@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from facefolds_core.captures.generated import is_generated
 from facefolds_core.config.params_file import load_params, write_configs
 from facefolds_core.config.source_code import digests_of_stages
 from facefolds_core.files.paths import SubjectFolders, check_place
@@ -24,7 +23,7 @@ def configure(data: Path) -> str:
     params = load_params("params.yaml")
     for name, subject in params.subjects.items():
         named = {"mattes": subject.mattes, "start": subject.start}
-        if not is_generated(subject.source):
+        if not subject.is_generated:
             named["path"] = subject.path
         for key, path in named.items():
             if path is not None:

@@ -18,6 +18,7 @@ from facefolds_core.asset.manifest_file import MANIFEST_NAME, seal_is_whole
 from facefolds_core.asset.packing import MAX_PIXELS, MAX_SIDE, AtlasLayout, inside
 from facefolds_core.asset.segments import segment_problems
 from facefolds_core.asset.track_file import track_problems
+from facefolds_core.geometry.cameras import is_rotation
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.geometry.sphere_uv import Window
 
@@ -164,10 +165,8 @@ def _coordinate_problems(coordinates: Coordinates) -> list[str]:
 
 
 def _is_rotation(rows: tuple[tuple[float, ...], ...], tolerance: float = 1e-6) -> bool:
-    rotation = np.array(rows)
-    if not np.abs(rotation).max() <= 2:  # larger numbers might overflow
-        return False
-    return bool(np.abs(rotation @ rotation.T - np.eye(3)).max() <= tolerance and np.linalg.det(rotation) > 0)
+    rotation = np.array(rows)  # larger numbers than 2 might overflow
+    return bool(np.abs(rotation).max() <= 2) and is_rotation(rotation, tolerance)
 
 
 def _poster_problems(manifest: Manifest) -> list[str]:

@@ -21,7 +21,7 @@ from facefolds_core.asset.opaque import faces_over
 from facefolds_core.asset.packing import Rect
 from facefolds_core.errors import UserError
 from facefolds_core.geometry.meshes import TexturedMesh
-from facefolds_core.geometry.rays import EmbreeMesh
+from facefolds_core.geometry.rays import MISS, EmbreeMesh
 from facefolds_core.geometry.sphere_uv import Window
 
 ALPHA_BOUND = 1
@@ -98,7 +98,7 @@ def _covering(mesh: TexturedMesh, shown: NDArray[np.bool_]) -> NDArray[np.bool_]
     behind = EmbreeMesh(mesh.vertices, mesh.faces[shown])
     for direction in _directions():
         asked = np.flatnonzero(~found[clear] & (normals @ direction < 0))
-        hit = behind.meets(middles[asked], np.tile(direction, (len(asked), 1)))
+        hit = behind.first(middles[asked], np.tile(direction, (len(asked), 1))) != MISS
         found[clear[asked[hit]]] = True
     return found
 

@@ -213,17 +213,28 @@ def cameras_with_pictures(
 ) -> tuple[list[Calibration], list[Fact]]:
     """Cameras with both calibration and pictures, and facts on those without pictures, and without a calibration.
 
+    Two calibrations of one name are refused.
+
     Args:
         photos: camera -> frame -> picture.
         krt: whether the calibrations are those of a KRT, which the facts then name.
     """
-    known = {one.name for one in calibrations}
+    known = [one.name for one in calibrations]
+    twice = next((one for i, one in enumerate(calibrations) if one.name in known[:i]), None)
+    if twice is not None:
+        raise UserError(
+            "a camera appears twice",
+            file=twice.file,
+            place=twice.place,
+            found=twice.name,
+            remedy="mend the calibration, or copy it again",
+        )
     used = [one for one in calibrations if photos.get(one.name)]
     if not used:
         raise UserError(
             "no camera has both pictures and a calibration",
             file=root,
-            expected=f"pictures of cameras named {shorten([one.name for one in calibrations], 5)}",
+            expected=f"pictures of cameras named {shorten(known, 5)}",
             found=shorten(list(photos), 5) or "none",
             remedy="copy calibration and pictures of the same subject",
         )

@@ -17,7 +17,7 @@ from facefolds_core.captures.capture import Tracking
 from facefolds_core.errors import UserError
 from facefolds_core.facts import Fact, fact
 from facefolds_core.files.reading import check_folder, is_there, read_bytes, read_text
-from facefolds_core.geometry.cameras import HUGE
+from facefolds_core.geometry.cameras import HUGE, is_rotation
 from facefolds_core.system.spill import spilled
 
 Array = NDArray[np.float64]
@@ -83,7 +83,7 @@ def parse_pose(text: str, path: Path) -> Array:
         expected = f"3 rows of 4 finite numbers, none above {HUGE:g}"
         raise _wrong(message, file=path, expected=expected, found=pose.tolist())
     R = pose[:, :3]
-    if np.abs(R @ R.T - np.eye(3)).max() > 1e-3 or np.linalg.det(R) < 0:
+    if not is_rotation(R):
         expected, found = "R R^T = I and det R = 1", f"det R = {np.linalg.det(R):.6g}"
         raise _wrong("R of a head pose is not a rotation", file=path, expected=expected, found=found)
     return pose

@@ -24,7 +24,6 @@ from typing import Any
 import dask.system
 from distributed import get_worker
 
-from facefolds_core.cluster.dvc import THEN
 from facefolds_core.cluster.lockfile import LOCK
 from facefolds_core.cluster.project import Project
 from facefolds_core.errors import UserError
@@ -36,6 +35,8 @@ LOST_RECORD = re.compile(r"^ERROR: .*(\bruns\b.*\.tmp'|join\(\) argument must be
 a run for a damaged one, and removed it, or found the record's folder before there was anything in it
 (dvc/stage/cache.py, 3.x: `_load` takes the newest file of a folder)."""
 ATTEMPTS = 5
+LAST_LINES = 12
+"""Of a failed job's log: what a stage's message has."""
 
 
 @dataclass(frozen=True)
@@ -127,14 +128,14 @@ def do(job: Job, run: str) -> Outcome:
         )
 
 
-def repro(dvc: Callable[..., tuple[int, str]], *commands: Sequence[str]) -> tuple[int, str]:
-    """Exit status of DVC commands and all that was said; again where a record was lost to another job's DVC."""
-    status, log = dvc(*commands)
+def repro(dvc: Callable[[Sequence[str]], tuple[int, str]], command: Sequence[str]) -> tuple[int, str]:
+    """Exit status of a DVC command and all that was said; again where a record was lost to another job's DVC."""
+    status, log = dvc(command)
     said = log
     for _ in range(ATTEMPTS - 1):
         if not status or not LOST_RECORD.search(said):
             break
-        status, said = dvc(*commands)
+        status, said = dvc(command)
         log += said
     return status, log
 
@@ -148,18 +149,17 @@ def _environment(worker: Any) -> dict[str, str]:
 
 
 def _dvc(
-    run: str, root: Path, environment: Mapping[str, str], tell: Callable[[str], None], *commands: Sequence[str]
+    run: str, root: Path, environment: Mapping[str, str], tell: Callable[[str], None], command: Sequence[str]
 ) -> tuple[int, str]:
-    """Exit status of the last of some DVC commands in a job's folder, and what they said.
+    """Exit status of a DVC command in a job's folder, and what it said.
 
     Args:
-        run: that they are part of, with which they are ended.
+        run: that it is part of, with which it is ended.
         tell: hears each line that DVC says, at once.
     """
-    words = [word for command in commands for word in (THEN, *command)][1:]
     lines = []
     with subprocess.Popen(
-        [sys.executable, "-m", "facefolds_core.cluster.dvc", *words],
+        [sys.executable, "-m", "facefolds_core.cluster.dvc", *command],
         cwd=root,
         env=dict(environment),
         stdin=subprocess.DEVNULL,
@@ -190,7 +190,3 @@ def _last_lines(log: str) -> str:
     """The end of what a failed job said, without DVC's advice."""
     lines = [line.rstrip() for line in log.splitlines() if line.strip()]
     return "\n".join(lines[-LAST_LINES:]) or "it said nothing"
-
-
-LAST_LINES = 12
-"""Of a failed job's log: what a stage's message has."""

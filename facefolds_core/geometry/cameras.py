@@ -96,6 +96,11 @@ class Camera:
         return replace(self, w2c=np.concatenate([rotation, translation[:, None]], 1))
 
 
+def is_rotation(R: Array, tolerance: float = 1e-3) -> bool:
+    """Whether R (3, 3) is orthonormal and no reflection."""
+    return bool(np.abs(R @ R.T - np.eye(3)).max() <= tolerance and np.linalg.det(R) > 0)
+
+
 def check_camera(camera: Camera, file: object, place: str) -> None:
     """Refuse a camera that cannot project.
 
@@ -122,7 +127,7 @@ def check_camera(camera: Camera, file: object, place: str) -> None:
             found=K.tolist(),
         )
     R = camera.rotation
-    if np.abs(R @ R.T - np.eye(3)).max() > 1e-3 or np.linalg.det(R) < 0:
+    if not is_rotation(R):
         raise wrong(
             "R of [R|t] is not a rotation",
             expected="R R^T = I and det R = 1",

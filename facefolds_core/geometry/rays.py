@@ -67,22 +67,16 @@ class EmbreeMesh:
         if len(faces):
             TriangleMesh(self._scene, np.ascontiguousarray(vertices, np.float32), np.ascontiguousarray(faces, np.int32))
 
-    def meets(self, origins: Array, directions: Array) -> NDArray[np.bool_]:
-        """(R,) whether rays hit anything; origins, directions: (R, 3)."""
+    def first(self, origins: Array, directions: Array) -> Indices:
+        """(R,) the triangles that rays hit first, MISS where none; origins, directions: (R, 3)."""
         if not len(self.triangles):
-            return np.zeros(len(origins), bool)
+            return np.full(len(origins), MISS, np.int32)
         rays = (np.ascontiguousarray(of, np.float32) for of in (origins, directions))
-        found: NDArray[np.bool_] = np.asarray(self._scene.run(*rays)) != MISS
-        return found
+        return np.asarray(self._scene.run(*rays), np.int32)
 
     def nearest(self, origins: Array, directions: Array) -> TriangleHits:
         """Nearest hits of rays; origins, directions: (R, 3)."""
-        if not len(self.triangles):
-            return hits_in(self.triangles, np.full(len(origins), MISS, np.int32), origins, directions)
-        triangle = self._scene.run(
-            np.ascontiguousarray(origins, np.float32), np.ascontiguousarray(directions, np.float32)
-        )
-        return hits_in(self.triangles, np.asarray(triangle, np.int32), origins, directions)
+        return hits_in(self.triangles, self.first(origins, directions), origins, directions)
 
 
 def hits_in(triangles: Array, triangle: Indices, origins: Array, directions: Array) -> TriangleHits:

@@ -125,3 +125,8 @@ class Subject(Overrides):
 
     fps: FrameRate | None = None
     """Frames a second; null takes the source's (30 for Multiface, a video's own)."""
+
+    @property
+    def is_generated(self) -> bool:
+        """Whether the stage `capture` makes the capture, so that it is read from there and not from `path`."""
+        return self.source == "actor"

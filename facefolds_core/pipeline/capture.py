@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 from facefolds_core.captures.actor import write_capture
-from facefolds_core.captures.generated import is_generated
 from facefolds_core.config.stages import read_stage, read_subject
 from facefolds_core.errors import UserError
 from facefolds_core.files.paths import SubjectFolders, check_place
@@ -17,7 +16,7 @@ from facefolds_core.progress import progress
 
 def capture(folders: SubjectFolders) -> str:
     subject = read_subject(folders.config)
-    if is_generated(subject.source):
+    if subject.is_generated:
         return _generate(folders, subject, read_stage(CaptureParams, folders.config))
     path = check_place(subject.path, folders, "path")
     if not (is_folder(path) or is_regular(path)):

@@ -114,7 +114,7 @@ BAD: dict[str, tuple[Damage, str, str, str]] = {
     "KRT: huge": (krt(2, "150 0 1e12"), "garbled KRT", "KRT", "line 2 (camera 400001)"),
     "KRT: digits of another script": (krt(2, "150 0 \u0661\u0662_"), "garbled KRT", "KRT", "line 2 (camera 400001)"),
     "KRT: name": (krt(1, "4000 01"), "garbled KRT", "KRT", "line 1"),
-    "KRT: twice": (krt(10, "400001"), "a camera appears twice", "KRT", "line 10"),
+    "KRT: twice": (krt(10, "400001"), "a camera appears twice", "KRT", "lines 10 to 17"),
     "KRT: singular K": (krt(2, "0 0 22"), "singular", "KRT", "camera 400001, lines 1 to 8"),
     "KRT: singular R": (krt(7, "0 0 0 1"), "not a rotation", "KRT", "camera 400001, lines 1 to 8"),
     "KRT: truncated": (

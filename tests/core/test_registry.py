@@ -12,7 +12,6 @@ from typer.testing import CliRunner
 
 from facefolds_core.asset import codecs
 from facefolds_core.asset.codecs import CODECS
-from facefolds_core.captures.generated import is_generated
 from facefolds_core.cli import app
 from facefolds_core.params import Subject, compress, subject
 from facefolds_core.registry import EXPORTERS, SOURCES, Registry
@@ -23,7 +22,7 @@ from tests.processes import printed
 def test_every_source_reads() -> None:
     assert {"actor", "multiface", "transforms"} <= set(SOURCES.names) == set(get_args(subject.SourceName))
     assert all(callable(SOURCES[name].read) for name in SOURCES.names)
-    assert [name for name in SOURCES.names if is_generated(name)] == ["actor"]
+    assert [name for name in SOURCES.names if Subject(source=name, path="x").is_generated] == ["actor"]
     assert [name for name in SOURCES.names if not hasattr(SOURCES[name], "recognise")] == ["actor"]
 
 

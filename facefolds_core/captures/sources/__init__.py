@@ -4,8 +4,8 @@ A module has
 
     def read(root: Path, subject: Subject) -> Capture
 
-which reads everything but the pixels, or raises `UserError`. Those of `captures.generated` read what the stage
-`capture` has made; all others read the folder or file that `path` names, and have
+which reads everything but the pixels, or raises `UserError`. The actor's reads what the stage `capture` has
+made; all others read the folder or file that `path` names, and have
 
     def recognise(root: Path) -> Recognised | None
 
@@ -16,7 +16,6 @@ source). The first line of a module's docstring names the layout.
 from __future__ import annotations
 
 from facefolds_core.captures.capture import Capture
-from facefolds_core.captures.generated import is_generated
 from facefolds_core.captures.looking import check_layout
 from facefolds_core.files.paths import SubjectFolders, check_place
 from facefolds_core.params import CaptureParams, Subject
@@ -32,7 +31,7 @@ def read_capture(subject: Subject, folders: SubjectFolders, params: CaptureParam
     Raises:
         UserError: if its place is none that may be read, or what is there is damaged.
     """
-    if is_generated(subject.source):
+    if subject.is_generated:
         place = folders.capture
         subject = subject.model_copy(update={"fps": subject.fps or params.frame_rate})
     else:

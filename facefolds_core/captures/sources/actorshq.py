@@ -65,10 +65,9 @@ def _pictures(camera: Path, kind: str) -> dict[str, Picture]:
 
 def _table(path: Path) -> list[Calibration]:
     text = read_text(path, "point `path` at the folder of one scale (4x), which holds it", expected="calibration.csv")
-    rows = list(csv.reader(io.StringIO(text), skipinitialspace=True))
-    header = tuple(rows[0]) if rows else ()
-    missing = [name for name in COLUMNS if name not in header]
-    if missing:
+    rows = csv.DictReader(io.StringIO(text), skipinitialspace=True)
+    header = rows.fieldnames or ()
+    if not set(COLUMNS) <= set(header):
         raise _wrong(
             "a table of cameras without all columns",
             file=path,
@@ -77,21 +76,11 @@ def _table(path: Path) -> list[Calibration]:
             found=", ".join(header)[:200] or "an empty file",
         )
     cameras: list[Calibration] = []
-    for number, row in enumerate(rows[1:], 2):
-        if not row:
-            continue
-        if len(row) != len(header):
-            raise _wrong(
-                "a line of the table has too few or too many values",
-                file=path,
-                place=f"line {number}",
-                expected=f"{len(header)} values",
-                found=f"{len(row)}",
-            )
-        camera = _camera(dict(zip(header, row, strict=True)), path, number)
-        if camera.name in {other.name for other in cameras}:
-            raise _wrong("a camera appears twice", file=path, place=f"line {number}", found=camera.name)
-        cameras.append(camera)
+    for row in rows:
+        if None in row or None in row.values():
+            message, place = "a line of the table has too few or too many values", f"line {rows.line_num}"
+            raise _wrong(message, file=path, place=place, expected=f"{len(header)} values")
+        cameras.append(_camera(row, path, rows.line_num))
     if not cameras:
         raise _wrong("a table without cameras", file=path, expected="a line a camera")
     return cameras

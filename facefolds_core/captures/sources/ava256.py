@@ -105,12 +105,7 @@ def _calibrations(path: Path) -> list[Calibration]:
     entries = value.get("KRT") if isinstance(value, dict) else None
     if not isinstance(entries, list) or not entries:
         raise _wrong("no cameras", file=path, place="KRT", expected="a list", found=short(entries))
-    cameras = [_calibration(entry, path, f"KRT[{i}]") for i, entry in enumerate(entries)]
-    names = [camera.name for camera in cameras]
-    if len(set(names)) != len(names):
-        twice = next(name for name in names if names.count(name) > 1)
-        raise _wrong("a camera appears twice", file=path, place="KRT", found=twice)
-    return cameras
+    return [_calibration(entry, path, f"KRT[{i}]") for i, entry in enumerate(entries)]
 
 
 def _calibration(entry: Any, path: Path, place: str) -> Calibration:

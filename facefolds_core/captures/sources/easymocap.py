@@ -18,7 +18,6 @@ prints to the terminal, and says of a damaged file neither line nor key.
 from __future__ import annotations
 
 import re
-from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -88,11 +87,7 @@ def _names(intri: dict[str, Any], path: Path) -> list[str]:
         raise UserError(
             "no names of cameras", file=path, place="names", expected="a list", found=short(names), remedy=REMEDY
         )
-    texts = [str(name) for name in names if name != "none"]  # EasyMocap ends its lists with "none"
-    twice = [name for name, count in Counter(texts).items() if count > 1]
-    if twice:
-        raise UserError("a camera appears twice", file=path, place="names", found=shorten(twice), remedy=REMEDY)
-    return texts
+    return [str(name) for name in names if name != "none"]  # EasyMocap ends its lists with "none"
 
 
 def _calibration(root: Path, intri: dict[str, Any], extri: dict[str, Any], name: str) -> Calibration:

@@ -155,10 +155,7 @@ def read_krt(path: Path) -> list[Calibration]:
     cameras: list[Calibration] = []
     for first in range(0, len(lines), 8):
         block = lines[first : first + 8]
-        camera = _camera(block, path)
-        if any(camera.name == other.name for other in cameras):
-            raise _wrong("a camera appears twice in KRT", file=path, place=f"line {block[0][0]}", found=camera.name)
-        cameras.append(camera)
+        cameras.append(_camera(block, path))
     if not cameras:
         raise _wrong("KRT is empty", file=path, expected="at least one camera")
     return cameras

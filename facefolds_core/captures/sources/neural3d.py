@@ -24,7 +24,7 @@ from facefolds_core.captures.numbers import read_npy
 from facefolds_core.errors import UserError
 from facefolds_core.facts import shorten
 from facefolds_core.files.reading import is_regular
-from facefolds_core.geometry.cameras import HUGE
+from facefolds_core.geometry.cameras import HUGE, is_rotation
 from facefolds_core.params import Subject
 
 PIXEL_CENTRES = 0.5
@@ -68,7 +68,7 @@ def _camera(name: str, row: NDArray[np.float64], path: Path, index: int) -> Cali
     wrong = partial(UserError, file=path, place=place, remedy=_REMEDY)
     down, right, back, centre, (height, width, focal) = row[:15].reshape(3, 5).T
     rotation = np.stack([right, down, -back])
-    if np.abs(rotation @ rotation.T - np.eye(3)).max() > 1e-3 or np.linalg.det(rotation) < 0:
+    if not is_rotation(rotation):
         found = f"det = {np.linalg.det(rotation):.6g}, {np.round(rotation, 4).tolist()}"
         raise wrong("a row without a rotation", expected="columns down, right, back: orthonormal axes", found=found)
     if not (1 <= width <= 1 << 20 and 1 <= height <= 1 << 20 and abs(focal) <= HUGE):

@@ -29,7 +29,7 @@ from facefolds_core.errors import UserError
 from facefolds_core.facts import fact, shorten
 from facefolds_core.files.reading import is_folder, is_regular, is_there
 from facefolds_core.files.writing import read_json
-from facefolds_core.geometry.cameras import HUGE, Camera, check_camera
+from facefolds_core.geometry.cameras import HUGE, Camera, check_camera, is_rotation
 from facefolds_core.params import Subject
 
 Array = NDArray[np.float64]
@@ -149,7 +149,7 @@ def _w2c(value: dict[str, Any], path: Path, place: str) -> Array:
     if len(c2w) == 4 and not np.allclose(c2w[3], [0, 0, 0, 1]):
         raise wrong(path, place, "a camera matrix whose last row is not 0 0 0 1", "[0, 0, 0, 1]", c2w[3].tolist())
     rotation = c2w[:3, :3] @ np.diag([1.0, -1.0, -1.0])
-    if np.abs(rotation.T @ rotation - np.eye(3)).max() > 1e-3 or np.linalg.det(rotation) < 0:
+    if not is_rotation(rotation.T):
         expected, found = "orthonormal columns, determinant +1", f"det = {np.linalg.det(c2w[:3, :3]):.6g}"
         raise wrong(path, place, "a camera matrix is no rotation and translation", expected, found)
     inverse = closest_rotation(np.concatenate([rotation.T, np.zeros((3, 1))], 1))
