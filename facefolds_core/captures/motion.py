@@ -67,7 +67,7 @@ def is_much(degrees: float, shift: float) -> bool:
     return degrees > MUCH_TURN or shift > MUCH_SHIFT
 
 
-def in_head(vertices: Array, track: Track | None, first: int = 0) -> Array:
+def in_head(vertices: Array, track: Track | None, first: int) -> Array:
     """Vertices (K, V, 3) of the world in frames `first` on, in the head's own frame."""
     if track is None:
         return vertices

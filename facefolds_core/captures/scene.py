@@ -135,13 +135,11 @@ class Scene:
             for position in range(len(indices))
             for part in range(count)
         ]
-        found, torso = (
-            [self.camera_in_head(i, k) for i, k in zip(np.repeat(indices, count), turns, strict=True)],
-            self.poses.torso,
-        )
-        return (
-            found if torso is None else [*found, *(self.cameras[i].transformed(torso.rest.inverse()) for i in indices)]
-        )
+        found = [self.camera_in_head(i, k) for i, k in zip(np.repeat(indices, count), turns, strict=True)]
+        if self.poses.torso is None:
+            return found
+        made = self.poses.torso.rest.inverse()
+        return [*found, *(self.cameras[i].transformed(made) for i in indices)]
 
     def stored(self, path: Path) -> FrameStore | None:
         """The scene's frames of a frame store, or None where there is none."""
@@ -156,8 +154,7 @@ class Scene:
 
     def open_plates(self) -> FrameStore | None:
         """Clean plates, (camera, 0) -> the picture without the subject, of some cameras; None where there is none."""
-        path = self.folder / "plates.arrow"
-        return FrameStore(path) if is_there(path) else None
+        return Scene.stored(self, self.folder / "plates.arrow")  # those of a part are the scene's
 
     def open_mattes(self) -> FrameStore | None:
         """Opacity (0..255, one channel) that training may use, of some images of any camera; None without any."""

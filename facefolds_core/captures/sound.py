@@ -39,17 +39,16 @@ def cut_sound(source: Path, target: Path, start: float, seconds: float) -> None:
             if not container.streams.audio:
                 raise _unreadable(source, "it has no audio stream")
             stream = container.streams.audio[0]
-            rate, layout = stream.codec_context.sample_rate, stream.codec_context.channels > 1
+            rate, channels = stream.codec_context.sample_rate, 2 if stream.codec_context.channels > 1 else 1
             if not RATES[0] <= rate <= RATES[1]:
                 raise _unreadable(source, f"{rate} samples a second")
-            convert = av.AudioResampler(format="s16", layout="stereo" if layout else "mono", rate=rate)
+            convert = av.AudioResampler(format="s16", layout="stereo" if channels == 2 else "mono", rate=rate)
             frames = [part for frame in container.decode(stream) for part in convert.resample(frame)]
             frames += convert.resample(None)
     except (FFmpegError, ValueError, OverflowError) as error:
         raise _unreadable(source, str(error)) from None
     except MemoryError:
         raise no_memory(source) from None
-    channels = 2 if layout else 1
     samples = np.concatenate([np.zeros(0, np.int16), *(frame.to_ndarray().reshape(-1) for frame in frames)])
     first, length = round(start * rate), round(seconds * rate)
     samples = samples.reshape(-1, channels)[first : first + length]

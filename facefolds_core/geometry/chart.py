@@ -67,11 +67,15 @@ class Chart:
     def uv(self, points: Any) -> tuple[Any, Any]:
         """Points (..., 3), of numpy or torch -> (u, v) (..., 2) and radius (...)."""
         lib = library_of(points)
-        centre = self._like(points, self.centre)
+        centre = np.array(self.centre) if lib is np else points.new_tensor(self.centre)
         uv, radius = points_to_uv(points, centre)
         if self.belt is None:
             return uv, radius
-        flat, below, slide = self._below(points - centre)
+        offset = points - centre
+        x, y, z = (offset[..., k] for k in range(3))
+        flat = lib.sqrt(x**2 + y**2)  # distance from the axis
+        slide = -z - flat * math.tan(self.belt.elevation)  # of the ray's origin
+        below = slide > 0
         u = -(self.belt.elevation + slide / self.belt.girth) / _TO_ANGLE
         uv = lib.stack([lib.where(below, u, uv[..., 0]), uv[..., 1]], -1)
         return uv, lib.where(below, flat / math.cos(self.belt.elevation), radius)
@@ -128,16 +132,3 @@ class Chart:
     def _fall(uv: Any, belt: Belt) -> Any:
         """(u, v) (..., 2) -> (...) radians of u below the belt, 0 above it."""
         return library_of(uv).clip(-uv[..., 0] * _TO_ANGLE - belt.elevation, 0, None)
-
-    def _below(self, offset: Any) -> tuple[Any, Any, Any]:
-        """Of p - c: distance from the axis, whether it is below the belt, and how far its ray's origin has slid."""
-        assert self.belt is not None
-        lib = library_of(offset)
-        flat = lib.sqrt(offset[..., 0] ** 2 + offset[..., 1] ** 2)
-        slide = -offset[..., 2] - flat * math.tan(self.belt.elevation)
-        return flat, slide > 0, slide
-
-    @staticmethod
-    def _like(points: Any, values: tuple[float, ...]) -> Any:
-        lib = library_of(points)
-        return np.array(values) if lib is np else points.new_tensor(values)
