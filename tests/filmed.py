@@ -120,6 +120,13 @@ def scene_of(root: Path, source: str, folder: Path, names: tuple[str, ...], **su
     return write_plan(plan_scene(capture, "filmed", entry, params, folder), params)
 
 
+def save_pictures(folder: Path, names: Sequence[str], pictures: Image) -> None:
+    """(C, K, H, W, 3) or (C, K, H, W) as folder/NAME/000000.png."""
+    for name, row in zip(names, pictures, strict=True):
+        for k, picture in enumerate(row):
+            save(folder / name / f"{k:06d}.png", picture)
+
+
 def save_jpeg(path: Path, image: Image) -> None:
     """As good as JPEG gets: 48 dB and more."""
     path.parent.mkdir(parents=True, exist_ok=True)

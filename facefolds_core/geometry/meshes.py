@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,18 +50,7 @@ class TexturedMesh(Surface):
         return trimesh.Trimesh(self.vertices, self.faces, visual=visual, process=False)
 
 
-class Mesh(Protocol):
-    """One layer: vertices (V, 3) float32, faces (F, 3) int32, st (V, 2) float32."""
-
-    @property
-    def vertices(self) -> NDArray[np.float32]: ...
-    @property
-    def faces(self) -> NDArray[np.int32]: ...
-    @property
-    def st(self) -> NDArray[np.float32]: ...
-
-
-def layers_at(layers: Sequence[Mesh], track: Track | None, frame: float) -> Sequence[Mesh]:
+def layers_at(layers: Sequence[TexturedMesh], track: Track | None, frame: float) -> Sequence[TexturedMesh]:
     """Layers in a frame, in their own axes: a torso stays in the room while the head turns."""
     if track is None or track.torso is None:
         return layers

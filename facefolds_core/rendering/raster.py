@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facefolds_core.geometry.cameras import Camera
-from facefolds_core.geometry.meshes import Mesh
+from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.kernels.jit import kernel
 from facefolds_core.rendering.reference import Hits
 
@@ -28,7 +28,7 @@ FLAT = 1e-12
 Array = NDArray[Any]
 
 
-def cast_mesh(camera: Camera, mesh: Mesh, hit: Array, st: Array) -> None:
+def cast_mesh(camera: Camera, mesh: TexturedMesh, hit: Array, st: Array) -> None:
     """Nearest hits of the rays through all pixel centres with one mesh.
 
     Args:

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from facefolds_core.geometry.cameras import Camera
-from facefolds_core.geometry.meshes import Mesh, layers_at
+from facefolds_core.geometry.meshes import TexturedMesh, layers_at
 from facefolds_core.geometry.rays import MISS, EmbreeMesh
 from facefolds_core.geometry.track import Track
 from facefolds_core.rendering.compositing import FrontToBack
@@ -33,7 +33,7 @@ class Layered(Protocol):
     """What the renderer needs of an asset: its meshes, outermost first, and frame k of its textures."""
 
     @property
-    def layers(self) -> Sequence[Mesh]: ...
+    def layers(self) -> Sequence[TexturedMesh]: ...
     def frame(self, k: int, /) -> Sequence[Texture]:
         """N textures, straight alpha."""
         ...
@@ -67,7 +67,7 @@ class Hits:
         return cls(np.concatenate([part.hit for part in parts], 1), np.concatenate([part.st for part in parts], 1))
 
 
-def layers_in(asset: Layered, frame: float) -> Sequence[Mesh]:
+def layers_in(asset: Layered, frame: float) -> Sequence[TexturedMesh]:
     """The layers of an asset in a frame, in their own axes."""
     return layers_at(asset.layers, getattr(asset, "track", None), frame)
 

@@ -9,8 +9,7 @@ import pytest
 
 from facefolds_core.captures.actor.capture import krt_block
 from facefolds_core.captures.scene import Scene
-from tests.captures.fixtures import save
-from tests.filmed import check_same, film, scene_of
+from tests.filmed import check_same, film, save_pictures, scene_of
 
 
 @pytest.fixture(scope="module")
@@ -18,10 +17,8 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Scene:
     """The film as a Multiface capture without mesh."""
     root, truth = tmp_path_factory.mktemp("multiface"), film()
     (root / "KRT").write_text("".join(krt_block(camera) for camera in truth.cameras))
-    for c, name in enumerate(truth.names):
-        for k in range(truth.frames):
-            save(root / "images" / "S" / name / f"{k:06d}.png", truth.images[c, k])
-            save(root / "masks" / "S" / name / f"{k:06d}.png", truth.mattes[c, k])
+    save_pictures(root / "images" / "S", truth.names, truth.images)
+    save_pictures(root / "masks" / "S", truth.names, truth.mattes)
     return scene_of(root, "multiface", root / "scene", truth.names)
 
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from facefolds_core.captures.sources import colmap
 from facefolds_core.geometry.cameras import Camera
 from tests.captures.fixtures import pattern, save
-from tests.filmed import Reader, check_same, film, moved, scene_of
+from tests.filmed import Reader, check_same, film, moved, save_pictures, scene_of
 
 read = Reader("colmap")
 
@@ -62,19 +62,12 @@ class Model:
         (folder / "images.bin").write_bytes(data)
 
 
-def film_pictures(root: Path) -> None:
-    truth = film()
-    for c, name in enumerate(truth.names):
-        for k in range(truth.frames):
-            save(root / "images" / name / f"{k:06d}.png", truth.images[c, k])
-
-
 @pytest.mark.parametrize("kind", ["txt", "bin"])
 @pytest.mark.parametrize("named", ["{}.png", "{}/000001.png"])
 def test_the_filmed_actor_comes_back_from_one_registered_picture_a_camera(
     tmp_path: Path, kind: str, named: str
 ) -> None:
-    film_pictures(tmp_path)
+    save_pictures(tmp_path / "images", film().names, film().images)
     model = Model()
     for camera in film().cameras:
         model.add(camera, named.format(camera.name))
@@ -86,7 +79,7 @@ def test_the_filmed_actor_comes_back_from_one_registered_picture_a_camera(
 
 def test_it_comes_back_from_pictures_that_were_all_registered(tmp_path: Path) -> None:
     """Each has a pose and a camera of its own; one picture was not registered."""
-    film_pictures(tmp_path)
+    save_pictures(tmp_path / "images", film().names, film().images)
     model = Model()
     for c, camera in enumerate(film().cameras):
         for k in range(film().frames):

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from tests.captures.fixtures import pattern, save
-from tests.filmed import Reader, check_same, film, save_video, scene_of
+from tests.filmed import Reader, check_same, film, save_pictures, save_video, scene_of
 
 read = Reader("easymocap")
 
@@ -39,10 +39,8 @@ def write_calibration(root: Path) -> None:
 def filmed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     root, truth = tmp_path_factory.mktemp("easymocap"), film()
     write_calibration(root)
-    for c, name in enumerate(truth.names):
-        for k in range(truth.frames):
-            save(root / "images" / name / f"{k:06d}.png", truth.images[c, k])
-            save(root / "mask" / name / f"{k:06d}.png", truth.mattes[c, k])
+    save_pictures(root / "images", truth.names, truth.images)
+    save_pictures(root / "mask", truth.names, truth.mattes)
     return root
 
 
