@@ -16,11 +16,9 @@ from facefolds_core.captures.lens import Lens
 from facefolds_core.captures.picture import Picture
 from facefolds_core.errors import UserError
 from facefolds_core.facts import Fact, fact, shorten
-from facefolds_core.geometry.cameras import Camera
+from facefolds_core.geometry.cameras import Array, Camera
 from facefolds_core.params import FrameRange, Subject
 from facefolds_core.system.spill import by_rows
-
-Array = NDArray[np.float64]
 
 RATES = (0.1, 1000.0)
 """Frames a second of a capture."""

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from facefolds_core.captures.capture import Capture, View, closest_rotation, frame_rate, select_frames
 from facefolds_core.captures.lens import make_lens
@@ -19,10 +18,9 @@ from facefolds_core.captures.videos import Video, check_together
 from facefolds_core.errors import UserError
 from facefolds_core.facts import Fact, fact, shorten
 from facefolds_core.files.reading import is_folder
-from facefolds_core.geometry.cameras import Camera, check_camera
+from facefolds_core.geometry.cameras import Array, Camera, check_camera
 from facefolds_core.params import FrameRange, Subject
 
-Array = NDArray[np.float64]
 Photos = Mapping[str, Mapping[str, Picture]]
 """Camera -> frame -> picture."""
 

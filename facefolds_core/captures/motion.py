@@ -5,17 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from facefolds_core.captures.capture import Capture, Tracking
 from facefolds_core.errors import UserError
 from facefolds_core.facts import Fact, fact
-from facefolds_core.geometry.similarity import Similarity
+from facefolds_core.geometry.similarity import Array, Similarity
 from facefolds_core.geometry.track import Track, own_track, rigid_motion
 from facefolds_core.params import NormalizeParams
 from facefolds_core.system.spill import by_rows, running_mean
-
-Array = NDArray[np.float64]
 
 MUCH_TURN = 2.0
 """`stabilize: auto` stabilises where the head turns by more in any frame, against its mean pose, degrees."""

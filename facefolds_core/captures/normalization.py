@@ -6,18 +6,15 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from facefolds_core.captures.capture import Capture, Tracking
 from facefolds_core.captures.motion import middles
 from facefolds_core.captures.scene import Split
 from facefolds_core.errors import UserError
 from facefolds_core.facts import Fact, fact, shorten
-from facefolds_core.geometry.cameras import Camera
+from facefolds_core.geometry.cameras import Array, Camera
 from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.params import HoldoutEvery, NormalizeParams, Subject
-
-Array = NDArray[np.float64]
 
 WELL_BESIDE = 60.0
 """Degrees: how far beside the front a camera still counts as one that faces the subject, in words only."""

@@ -12,13 +12,10 @@ from tokenize import TokenError
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from facefolds_core.errors import UserError
 from facefolds_core.files.reading import read_bytes
-from facefolds_core.geometry.cameras import HUGE
-
-Array = NDArray[np.float64]
+from facefolds_core.geometry.cameras import HUGE, Array
 
 
 def short(value: Any) -> str:

@@ -17,10 +17,9 @@ from facefolds_core.captures.capture import Tracking
 from facefolds_core.errors import UserError
 from facefolds_core.facts import Fact, fact
 from facefolds_core.files.reading import check_folder, is_there, read_bytes, read_text
-from facefolds_core.geometry.cameras import HUGE, is_rotation
+from facefolds_core.geometry.cameras import HUGE, Array, is_rotation
 from facefolds_core.system.spill import spilled
 
-Array = NDArray[np.float64]
 _REMEDY = "copy the file again from the dataset, or choose other frames for this subject in params.yaml"
 _wrong = partial(UserError, remedy=_REMEDY)
 

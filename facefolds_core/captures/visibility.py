@@ -16,9 +16,7 @@ from numpy.typing import NDArray
 
 from facefolds_core.errors import UserError
 from facefolds_core.facts import shorten
-from facefolds_core.geometry.cameras import Camera
-
-Array = NDArray[np.float64]
+from facefolds_core.geometry.cameras import Array, Camera
 
 NEAR, FAR = 0.02, 50.0
 """Distances of a camera from the centre; the median camera's is 1."""

@@ -15,9 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from facefolds_core.geometry.quaternions import quaternion, rotation
-from facefolds_core.geometry.similarity import Similarity
-
-Array = NDArray[np.float64]
+from facefolds_core.geometry.similarity import Array, Similarity
 
 NUMBERS = 12
 """Of `Torso.numbers`."""

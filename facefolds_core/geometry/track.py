@@ -8,12 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from facefolds_core.geometry.cameras import Camera
+from facefolds_core.geometry.cameras import Array, Camera
 from facefolds_core.geometry.quaternions import quaternion, rotation
 from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.geometry.torso import Torso
-
-Array = NDArray[np.float64]
 
 UNIT = 1e-6
 """How far from 1 the length of a quaternion may be in a file."""

@@ -22,10 +22,8 @@ from facefolds_core.captures.actor.room import room_colour
 from facefolds_core.captures.actor.shade import surface_colour
 from facefolds_core.captures.actor.shape import AROUND, RADIUS, normal, surface, trace
 from facefolds_core.captures.actor.shape import reach as shape_reach
-from facefolds_core.geometry.cameras import Camera
+from facefolds_core.geometry.cameras import Array, Camera
 from facefolds_core.kernels.jit import compiled, kernel
-
-Array = NDArray[np.float64]
 
 _DIFFERENT = 0.1
 """Neighbours that differ by more than this in a colour or in opacity are sampled more finely."""

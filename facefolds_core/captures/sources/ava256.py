@@ -26,7 +26,7 @@ import numpy as np
 from trimesh.exchange.ply import load_ply
 
 from facefolds_core.captures.capture import Capture, Tracking
-from facefolds_core.captures.gathering import Array, Calibration, Recognised, chosen_segment, gather, inside
+from facefolds_core.captures.gathering import Calibration, Recognised, chosen_segment, gather, inside
 from facefolds_core.captures.numbers import is_number, matrix_from, short
 from facefolds_core.captures.picture import Picture, ZipPicture, open_zip, read_member
 from facefolds_core.captures.tracked import check_extent, parse_pose, read_obj
@@ -34,7 +34,7 @@ from facefolds_core.errors import UserError
 from facefolds_core.facts import Fact, fact, shorten
 from facefolds_core.files.reading import check_folder, check_regular, is_regular, read_text
 from facefolds_core.files.writing import read_json
-from facefolds_core.geometry.cameras import HUGE
+from facefolds_core.geometry.cameras import HUGE, Array
 from facefolds_core.params import Subject
 
 FULL_SIZE = (2668, 4096)

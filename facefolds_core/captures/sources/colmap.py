@@ -22,7 +22,6 @@ from dataclasses import replace
 from pathlib import Path, PurePosixPath
 
 import numpy as np
-from numpy.typing import NDArray
 
 from facefolds_core.captures.arrangement import Shot, arrange, mean_calibration
 from facefolds_core.captures.capture import Capture
@@ -31,7 +30,7 @@ from facefolds_core.captures.picture import FilePicture, Picture
 from facefolds_core.errors import UserError
 from facefolds_core.facts import Fact, fact
 from facefolds_core.files.reading import is_folder, is_regular, is_there, read_bytes, read_text
-from facefolds_core.geometry.cameras import HUGE
+from facefolds_core.geometry.cameras import HUGE, Array
 from facefolds_core.geometry.quaternions import rotation
 from facefolds_core.params import Subject
 
@@ -48,7 +47,6 @@ ONE_FOCAL = ("SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL", "SIMPLE_RADIAL_FISHEYE
 UNREAD = ("FOV", "THIN_PRISM_FISHEYE", "RAD_TAN_THIN_PRISM_FISHEYE")
 _REMEDY = "write the model again (`colmap model_converter`)"
 
-Array = NDArray[np.float64]
 Photos = dict[str, dict[str, Picture]]
 Row = tuple[int, str, tuple[int, int], list[float], str]
 """Of a camera: its number, model, (width, height), parameters, and where it stands."""

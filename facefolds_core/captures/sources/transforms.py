@@ -18,7 +18,6 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from facefolds_core.captures.arrangement import REMEDY, Shot, arrange, mean_calibration, wrong
 from facefolds_core.captures.capture import Capture, closest_rotation, frame_rate, select_frames
@@ -29,10 +28,8 @@ from facefolds_core.errors import UserError
 from facefolds_core.facts import fact, shorten
 from facefolds_core.files.reading import is_folder, is_regular, is_there
 from facefolds_core.files.writing import read_json
-from facefolds_core.geometry.cameras import HUGE, Camera, check_camera, is_rotation
+from facefolds_core.geometry.cameras import HUGE, Array, Camera, check_camera, is_rotation
 from facefolds_core.params import Subject
-
-Array = NDArray[np.float64]
 
 FPS = 30.0
 PIXEL_CENTRES = 0.5
