@@ -162,7 +162,8 @@ def read_model(folder: Path) -> tuple[list[Calibration], Path]:
     cameras = {number: _camera(name, size, values, first, place) for number, name, size, values, place in rows}
     posed = _images_bin(second) if kind == "bin" else _images_txt(second)
     images = []
-    for name, number, w2c, place in [(name, n, _w2c(pose, second, place), place) for name, n, pose, place in posed]:
+    for name, number, pose, place in posed:
+        w2c = _w2c(pose, second, place)
         if number not in cameras:
             expected, found = f"one of {first.name}", f"camera {number}"
             raise _wrong(second, place, "an image of a camera that is not there", expected, found)

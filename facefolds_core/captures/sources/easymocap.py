@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 
 from facefolds_core.captures.capture import Capture
 from facefolds_core.captures.gathering import Calibration, Recognised, footage, gather, inside, pictures_in
-from facefolds_core.captures.numbers import numbers_from, short
+from facefolds_core.captures.numbers import is_number, numbers_from, short
 from facefolds_core.captures.picture import FilePicture, Picture
 from facefolds_core.captures.videos import CONTAINERS
 from facefolds_core.errors import UserError
@@ -102,9 +102,8 @@ def _calibration(root: Path, intri: dict[str, Any], extri: dict[str, Any], name:
         rotation = np.asarray(cv2.Rodrigues(rotation.ravel())[0], float)
     translation = needed_matrix(extri, {f"T_{name}": vector}, outer)
     w2c = np.concatenate([rotation, translation.reshape(3, 1)], 1)
-    sides = [intri.get(f"{side}_{name}") for side in "WH"]
-    known = all(isinstance(s, int | float) and not isinstance(s, bool) and 1 <= s < 1e6 for s in sides)
-    size = (round(float(sides[0] or 0)), round(float(sides[1] or 0))) if known else None
+    sides: list[Any] = [intri.get(f"{side}_{name}") for side in "WH"]
+    size = (round(sides[0]), round(sides[1])) if all(is_number(side) and 1 <= side < 1e6 for side in sides) else None
     return Calibration(name, K, w2c, inner, f"camera {name}", coefficients, size=size)
 
 
