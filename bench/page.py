@@ -21,7 +21,6 @@ from facefolds_core.cli.render import parse_size
 from facefolds_core.errors import report_user_errors
 from facefolds_core.files.writing import write_json
 from facefolds_core.rendering.opengl import OpenGLRenderer
-from facefolds_core.rendering.opengl_reflection import Glossy
 from facefolds_core.rendering.pixels import finer, pixel_means
 from facefolds_core.serving.player import find_player
 from facefolds_core.serving.server import serving
@@ -119,7 +118,7 @@ def agreement(browser: Browser, address: str, asset: Path) -> dict[str, float]:
     page.goto(f"{address}?src=asset/#frame=0&level=full&background={GREY[1:]}")
     page.wait_for_function("() => document.querySelector('facefolds-player').level === 'full'", timeout=PATIENCE)
     level, grey = read_asset(asset).full, (GREY_VALUE,) * 3
-    with OpenGLRenderer(level, Glossy.of(level)) as renderer:
+    with OpenGLRenderer(level, level.reflection()) as renderer:
         found = {
             camera.name: psnr(captured(page, camera)[..., :3], pixel_means(renderer.render(finer(camera), 0, grey)[0]))
             for camera in five_cameras(AGREEMENT_SIDE)

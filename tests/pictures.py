@@ -11,10 +11,9 @@ from numpy.typing import NDArray
 from facefolds_core.asset import Asset
 from facefolds_core.asset.reader import AssetLevel
 from facefolds_core.geometry.cameras import Camera
-from facefolds_core.rendering import AssetCaster, composite
 from facefolds_core.rendering.areas import AreaView
 from facefolds_core.rendering.raster import cast_layers
-from facefolds_core.rendering.reference import room_from
+from facefolds_core.rendering.reference import AssetCaster, composite, room_from, seen_from
 from facefolds_core.rendering.reflection import reflected_colours
 from tests.scenes import look_at_origin
 
@@ -71,7 +70,7 @@ def lit_picture(
     Args:
         room: rotation from the meshes' axes to those of the light, by default that of the head.
     """
-    maps, seen_by = level.reflection(), level.camera_in_head(camera, frame)
+    maps, seen_by = level.reflection(), seen_from(level, camera, frame)
     assert maps is not None
     hits, turned = AssetCaster(level).cast(seen_by), room_from(level, frame) if room is None else room
     added = reflected_colours(hits, seen_by, level.windows, maps, turned)

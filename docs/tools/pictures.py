@@ -32,7 +32,6 @@ from facefolds_core.files.writing import atomic_file, file_sha256, read_json, wr
 from facefolds_core.rendering.areas import view_of
 from facefolds_core.rendering.camera_paths import Eye, camera_of, frame_due, turntable
 from facefolds_core.rendering.opengl import OpenGLRenderer
-from facefolds_core.rendering.opengl_reflection import Glossy
 from facefolds_core.rendering.pixels import SIDE, finer
 from facefolds_core.serving.player import find_player
 from facefolds_core.serving.server import serving
@@ -81,7 +80,7 @@ def film(subject: Path, out: Path) -> None:
     start, samples = Eye(distance=1.0, target=tuple(FILM["target"])), FILM["samples"]
     background = tuple(value / 255 for value in FILM["background"])
     pictures, rate = [], Fraction(1000, FILM["milliseconds"])
-    with OpenGLRenderer(shown, Glossy.of(shown)) as renderer:
+    with OpenGLRenderer(shown, shown.reflection()) as renderer:
         for index, eye in enumerate(turntable(start, FILM["pictures"], (FILM["sweep"], FILM["sweep"]))):
             camera = finer(camera_of(eye, width, height, FILM["field_of_view"]), samples)
             frame = frame_due(index, rate, shown.entry.texture.rate, shown.num_frames)
@@ -102,7 +101,7 @@ def limits(subject: Path, out: Path) -> None:
     shown, scene = read_asset(subject / "asset").full, read_scene(subject / "scene")
     (width, height), panel, frame, gap = LIMITS["size"], LIMITS["panel"], LIMITS["frame"], LIMITS["gap"]
     shots = []
-    with OpenGLRenderer(shown, Glossy.of(shown)) as renderer:
+    with OpenGLRenderer(shown, shown.reflection()) as renderer:
         for azimuth, elevation, left, top, wide in LIMITS["views"]:
             camera = camera_at("limit", azimuth, elevation, width, height)
             truth, room = (

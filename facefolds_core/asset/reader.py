@@ -24,7 +24,6 @@ from facefolds_core.asset.track_file import read_track
 from facefolds_core.asset.video import Picture, decode_video, unpack_picture
 from facefolds_core.errors import UserError
 from facefolds_core.files.reading import is_folder
-from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.geometry.reflections import ReflectionMaps
 from facefolds_core.geometry.sphere_uv import Window
@@ -59,10 +58,6 @@ class AssetLevel:
     @property
     def num_frames(self) -> int:
         return self.entry.texture.frames
-
-    def camera_in_head(self, camera: Camera, time: float) -> Camera:
-        """A camera of the world as the meshes' own frame has it at a time in frames."""
-        return camera if self.track is None else self.track.camera(camera, time)
 
     def reflection(self) -> ReflectionMaps | None:
         """The reflection that all layers and frames share; None where the level has none.

@@ -40,7 +40,6 @@ from facefolds_core.rendering.camera_paths import (
     turntable,
 )
 from facefolds_core.rendering.opengl import OpenGLRenderer
-from facefolds_core.rendering.opengl_reflection import Glossy
 from facefolds_core.rendering.pixels import SIDE, finer, pixel_means
 
 FILM_RATE = Fraction(30)
@@ -277,7 +276,7 @@ def command(
             else [start]
         )
         away = far_enough(read, turns, width, height, field_of_view) if distance is None else distance
-        with OpenGLRenderer(shown, Glossy.of(shown) if reflection else None) as renderer:
+        with OpenGLRenderer(shown, shown.reflection() if reflection else None) as renderer:
 
             def shot(camera: Camera, index: int) -> NDArray[np.uint8]:
                 return shrink(renderer.render(finer(camera, samples), index, colour)[0], samples)

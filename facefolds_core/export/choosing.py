@@ -19,8 +19,8 @@ from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.meshes import TexturedMesh, layers_at
 from facefolds_core.geometry.reflections import ReflectionMaps
 from facefolds_core.geometry.sphere_uv import Window
-from facefolds_core.rendering import Hits, composite
 from facefolds_core.rendering.raster import cast_layers
+from facefolds_core.rendering.reference import Hits, composite
 from facefolds_core.rendering.reflection import reflected_colours
 from facefolds_core.spacing import spread
 

@@ -64,9 +64,7 @@ def shown_rays(
         codes = np.zeros((camera.height * camera.width, len(meshes), 2), np.uint16)
         shows = np.zeros(len(codes), bool)
         for layer, mesh in enumerate(meshes):
-            hit = np.zeros((camera.height, camera.width), bool)
-            st = np.zeros((camera.height, camera.width, 2), np.float32)
-            cast_mesh(camera, mesh, hit, st)
+            hit, st = cast_mesh(camera, mesh)
             own = np.flatnonzero(hit)
             codes[own, layer] = encode(st[hit])
             column, row = before(codes[own, layer], opacity.shape[1]).T

@@ -46,11 +46,10 @@ class AreaView:
     Args:
         size: (H, W) of the picture.
         layers: of each layer its hits, outermost first, with the rays of `finer`.
-        side: rays along each side of a pixel.
     """
 
-    def __init__(self, size: tuple[int, int], layers: Sequence[LayerHits], side: int = SIDE) -> None:
-        self.size, self.layers, self.side = size, layers, side
+    def __init__(self, size: tuple[int, int], layers: Sequence[LayerHits]) -> None:
+        self.size, self.layers = size, layers
 
     @classmethod
     def of_hits(cls, camera: Camera, hits: Callable[[Camera], Lit]) -> AreaView:
@@ -86,14 +85,14 @@ class AreaView:
         """
         if len(textures) != len(self.layers):
             raise ValueError(f"{len(textures)} textures for {len(self.layers)} layers")
-        height, width = (self.side * n for n in self.size)
+        height, width = (SIDE * n for n in self.size)
         light, rgb = np.ones(height * width, np.float32), np.zeros((height * width, 3), np.float32)
         for texture, layer in zip(textures, self.layers, strict=True):
             scale = np.float32(1 / 255 if texture.dtype == np.uint8 else 1)
             added = layer.added if lit else NOTHING
             _blend(np.ascontiguousarray(texture), scale, layer.rays, layer.st, added, light, rgb)
-        through = pixel_means(light.reshape(height, width), self.side)
-        seen = pixel_means(rgb.reshape(height, width, 3), self.side)
+        through = pixel_means(light.reshape(height, width))
+        seen = pixel_means(rgb.reshape(height, width, 3))
         return seen + through[..., None] * np.asarray(background, np.float32), 1 - through
 
 

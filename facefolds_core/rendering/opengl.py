@@ -17,9 +17,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from facefolds_core.errors import UserError
 from facefolds_core.geometry.cameras import Camera
-from facefolds_core.geometry.track import Track
-from facefolds_core.rendering.opengl_reflection import FRAGMENT_WITH_REFLECTION, Glossy, upload
-from facefolds_core.rendering.reference import BLACK, Image, Layered, room_from, seen_from
+from facefolds_core.geometry.reflections import ReflectionMaps, window_to_window
+from facefolds_core.rendering.reference import BLACK, Image, Layered, room_from, seen_from, track_of
 
 VERTEX = """
 #version 330
@@ -51,6 +50,29 @@ in vec2 st;
 out vec4 colour;
 void main() { colour = texture(picture, st); }
 """
+FRAGMENT_WITH_REFLECTION = """
+#version 330
+uniform sampler2D picture;
+uniform sampler2D added; // offset, gloss
+uniform sampler2D normals;
+uniform sampler2D environment;
+uniform vec4 to_maps; // (s, t) of the layer -> that of the maps: times xy, plus zw
+uniform vec3 eye;
+uniform mat3 to_room; // from the meshes' own axes to those of the room, which the light is fixed to
+in vec2 st;
+in vec3 point;
+out vec4 colour;
+void main() {
+  vec2 at = st * to_maps.xy + to_maps.zw;
+  vec4 here = texture(added, at);
+  vec3 normal = normalize(texture(normals, at).rgb);
+  vec3 along = normalize(point - eye);
+  vec3 r = to_room * (along - 2.0 * min(dot(along, normal), 0.0) * normal);
+  vec2 place = 0.5 + 0.5 * vec2(r.y, -r.z) / sqrt(max(2.0 * (1.0 + r.x), 1e-6));
+  colour = texture(picture, st);
+  colour.rgb = clamp(colour.rgb + here.a * texture(environment, place).rgb - here.rgb, 0.0, 1.0);
+}
+"""
 NOTHING = """
 #version 330
 out vec4 colour;
@@ -68,20 +90,24 @@ class OpenGLRenderer:
 
     Args:
         asset: its meshes go to the card at once, textures as frames are asked for.
-        glossy: the reflection; None for none.
+        maps: the reflection, of an asset with `windows`; None for none.
 
     Raises:
         UserError: if there is no OpenGL here.
     """
 
-    def __init__(self, asset: Layered, glossy: Glossy | None = None) -> None:
+    def __init__(self, asset: Layered, maps: ReflectionMaps | None = None) -> None:
         self._asset = asset
         self._context = _make_context()
-        self._colour = self._context.program(VERTEX, FRAGMENT_WITH_REFLECTION if glossy else FRAGMENT)
+        self._colour = self._context.program(VERTEX, FRAGMENT if maps is None else FRAGMENT_WITH_REFLECTION)
         self._depth = self._context.program(VERTEX, NOTHING)
         self._layers = [self._upload(layer) for layer in asset.layers]
-        self._glossy = glossy
-        self._reflections = [] if glossy is None else glossy.textures(self._context)
+        self._reflections: list[tuple[str, moderngl.Texture]] = []
+        self._to_maps: list[bytes] = []
+        if maps is not None:
+            windows: Any = getattr(asset, "windows", ())
+            self._reflections = self._upload_reflection(maps)
+            self._to_maps = [np.array(window_to_window(window, maps.window), "f4").tobytes() for window in windows]
         self._vertices = np.concatenate([layer.vertices for layer in asset.layers]).astype(np.float64)
         self._frame = -1
         self._textures: list[moderngl.Texture] = []
@@ -116,7 +142,7 @@ class OpenGLRenderer:
         target = self._sized_target(camera)
         _write(target, colour=True, depth=True)
         target.clear(0.0, 0.0, 0.0, 0.0, depth=1.0)
-        track: Track | None = getattr(self._asset, "track", None)
+        track = track_of(self._asset)
         points = self._vertices if track is None else track.posed(self._vertices, frame)
         projection = _projection(camera, points).T.astype("f4").tobytes()
         for program in (self._depth, self._colour):
@@ -134,8 +160,8 @@ class OpenGLRenderer:
             slice_ = np.array([0.99 / count, (2 * index + 1) / count - 1], "f4").tobytes()
             for program in (self._depth, self._colour):
                 _uniform(program, "slice").write(slice_)
-            if self._glossy is not None:
-                _uniform(self._colour, "to_maps").write(self._glossy.to_maps(index).tobytes())
+            if self._to_maps:
+                _uniform(self._colour, "to_maps").write(self._to_maps[index])
             self._draw_layer(target, *self._layers[index], self._textures[index])
         data = np.frombuffer(target.read(components=4, dtype="f4"), np.float32)
         rgba = data.reshape(camera.height, camera.width, 4)[::-1]
@@ -144,7 +170,7 @@ class OpenGLRenderer:
         return np.asarray(rgb, np.float32), alpha
 
     def _set_torso(self, program: moderngl.Program, frame: int) -> None:
-        track: Track | None = getattr(self._asset, "track", None)
+        track = track_of(self._asset)
         torso = None if track is None else track.torso
         _uniform(program, "band").value = 0.0 if torso is None else torso.band
         if track is None or torso is None:
@@ -181,12 +207,21 @@ class OpenGLRenderer:
         colour = self._context.vertex_array(self._colour, [(vertices, "3f 2f", "position", "corner_st")], indices)
         return depth, colour
 
+    def _upload_reflection(self, maps: ReflectionMaps) -> list[tuple[str, moderngl.Texture]]:
+        """Names of the samplers, and what they read."""
+        images = {
+            "added": np.concatenate([maps.offset, maps.gloss[..., None]], -1),
+            "normals": maps.normals,
+            "environment": maps.environment,
+        }
+        return [(name, _upload_image(self._context, image)) for name, image in images.items()]
+
     def _show_frame(self, frame: int) -> None:
         if frame == self._frame:
             return
         for texture in self._textures:
             texture.release()
-        self._textures = [upload(self._context, texture) for texture in self._asset.frame(frame)]
+        self._textures = [_upload_image(self._context, texture) for texture in self._asset.frame(frame)]
         self._frame = frame
 
     def _sized_target(self, camera: Camera) -> moderngl.Framebuffer:
@@ -222,6 +257,18 @@ def _make_context() -> moderngl.Context:
             found=str(error),
             remedy="on Debian and Ubuntu: apt-get install libegl1 libgl1 libgl1-mesa-dri (no screen is needed)",
         ) from None
+
+
+def _upload_image(context: moderngl.Context, image: NDArray[Any]) -> moderngl.Texture:
+    """An image (H, W, C), uint8 or else as float32. Stored values as they are: no sRGB format. Row 0 is the top, as t
+    runs."""
+    height, width, channels = image.shape
+    kind = "f1" if image.dtype == np.uint8 else "f4"
+    data = np.ascontiguousarray(image, np.uint8 if kind == "f1" else np.float32).tobytes()
+    texture = context.texture((width, height), channels, data, alignment=1, dtype=kind)
+    texture.filter = moderngl.LINEAR, moderngl.LINEAR
+    texture.repeat_x = texture.repeat_y = False
+    return texture
 
 
 def _write(target: moderngl.Framebuffer, colour: bool, depth: bool) -> None:

@@ -25,21 +25,17 @@ EDGE = 1e-9
 FLAT = 1e-12
 """Triangles seen from the side (|det M| below this times the product of the columns' lengths) are not drawn."""
 
-Array = NDArray[Any]
 
-
-def cast_mesh(camera: Camera, mesh: TexturedMesh, hit: Array, st: Array) -> None:
-    """Nearest hits of the rays through all pixel centres with one mesh.
-
-    Args:
-        hit: (H, W) bool, written.
-        st: (H, W, 2) float32, written; 0 where nothing is hit.
-    """
+def cast_mesh(camera: Camera, mesh: TexturedMesh) -> tuple[NDArray[np.bool_], NDArray[np.float32]]:
+    """Nearest hits of the rays through all pixel centres with one mesh: hit (H, W), and st (H, W, 2), 0 without one."""
+    hit = np.zeros((camera.height, camera.width), bool)
+    st = np.zeros((*hit.shape, 2), np.float32)
     corners = mesh.vertices.astype(np.float64) @ camera.rotation.T + camera.w2c[:, 3]
     image = corners @ camera.K.T
     with np.errstate(divide="ignore", invalid="ignore"):
         pixels = image[:, :2] / image[:, 2:]
     _draw(corners, pixels, mesh.faces, mesh.st, np.linalg.inv(camera.K), hit, st)
+    return hit, st
 
 
 def cast_layers(camera: Camera, layers: Any) -> Hits:
@@ -52,9 +48,7 @@ def cast_layers(camera: Camera, layers: Any) -> Hits:
     hit = np.zeros((*shape, len(layers)), bool)
     st = np.zeros((*shape, len(layers), 2), np.float32)
     for i, layer in enumerate(layers):
-        own_hit, own_st = np.zeros(shape, bool), np.zeros((*shape, 2), np.float32)
-        cast_mesh(camera, layer, own_hit, own_st)
-        hit[..., i], st[..., i, :] = own_hit, own_st
+        hit[..., i], st[..., i, :] = cast_mesh(camera, layer)
     return Hits(hit, st)
 
 

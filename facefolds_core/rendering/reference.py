@@ -20,7 +20,6 @@ from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.meshes import TexturedMesh, layers_at
 from facefolds_core.geometry.rays import MISS, EmbreeMesh
 from facefolds_core.geometry.track import Track
-from facefolds_core.rendering.compositing import FrontToBack
 
 Image = NDArray[np.float32]
 Texture = NDArray[np.uint8]
@@ -67,9 +66,15 @@ class Hits:
         return cls(np.concatenate([part.hit for part in parts], 1), np.concatenate([part.st for part in parts], 1))
 
 
+def track_of(asset: Layered) -> Track | None:
+    """The motion of an asset that has a `track`."""
+    track: Track | None = getattr(asset, "track", None)
+    return track
+
+
 def layers_in(asset: Layered, frame: float) -> Sequence[TexturedMesh]:
     """The layers of an asset in a frame, in their own axes."""
-    return layers_at(asset.layers, getattr(asset, "track", None), frame)
+    return layers_at(asset.layers, track_of(asset), frame)
 
 
 class AssetCaster:
@@ -135,14 +140,16 @@ def composite(
     if len(textures) != hits.hit.shape[2]:
         raise ValueError(f"{len(textures)} textures for {hits.hit.shape[2]} layers")
     rgb = np.zeros((*hits.hit.shape[:2], 3), np.float32)
-    light = FrontToBack(hits.hit.shape[:2])
+    light = np.ones(hits.hit.shape[:2], np.float32)  # prod (1 - alpha_k) of the layers so far
     for i, texture in enumerate(textures):
         hit = hits.hit[..., i]
         rgba = sample_texture(texture, hits.st[..., i, :][hit])
         colour = rgba[:, :3] if added is None else np.clip(rgba[:, :3] + added[i], 0, 1)
-        rgb[hit] += light.add(hit, rgba[:, 3])[:, None] * colour
-    rgb += light.transmittance[..., None] * np.asarray(background, np.float32)
-    return rgb, 1 - light.transmittance
+        before, alpha = light[hit], rgba[:, 3]
+        light[hit] = before * (1 - alpha)
+        rgb[hit] += (before * alpha)[:, None] * colour
+    rgb += light[..., None] * np.asarray(background, np.float32)
+    return rgb, 1 - light
 
 
 def render_asset(asset: Layered, camera: Camera, frame: int, background: ArrayLike = BLACK) -> tuple[Image, Image]:
@@ -158,11 +165,11 @@ def render_asset(asset: Layered, camera: Camera, frame: int, background: ArrayLi
 
 def seen_from(asset: Layered, camera: Camera, frame: float) -> Camera:
     """A camera of the world in the frame of the meshes, which an asset with a `track` moves."""
-    track: Track | None = getattr(asset, "track", None)
+    track = track_of(asset)
     return camera if track is None else track.camera(camera, frame)
 
 
 def room_from(asset: Layered, frame: float) -> NDArray[np.float64]:
     """(3, 3) rotation from the meshes' axes in a frame to those of the room, which the reflected light is fixed to."""
-    track: Track | None = getattr(asset, "track", None)
+    track = track_of(asset)
     return np.eye(3) if track is None else track.at(frame).rotation

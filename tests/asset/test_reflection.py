@@ -15,7 +15,7 @@ from facefolds_core.asset.validation import validate_asset
 from facefolds_core.export.stores import read_places
 from facefolds_core.geometry.sphere_uv import st_to_uv, uv_to_st
 from facefolds_core.model.reflection import Reflection, ReflectionShape
-from facefolds_core.rendering import AssetCaster
+from facefolds_core.rendering.reference import AssetCaster
 from facefolds_core.rendering.reflection import reflected_colours
 from tests.assets import make_asset
 from tests.scenes import look_at_origin

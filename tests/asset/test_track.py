@@ -21,8 +21,8 @@ from facefolds_core.asset.reader import AssetLevel
 from facefolds_core.asset.validation import validate_asset
 from facefolds_core.errors import UserError
 from facefolds_core.geometry.torso import Torso
-from facefolds_core.rendering import render_asset
 from facefolds_core.rendering.areas import view_of
+from facefolds_core.rendering.reference import render_asset
 from tests.assets import MOVING, OVER_TORSO, TORSO, TRACK, make_asset
 from tests.engines.tracks import with_track
 from tests.geometry.test_track import SHIFTS

@@ -10,7 +10,7 @@ from facefolds_core.asset import read_asset
 from facefolds_core.asset.glb import write_glb
 from facefolds_core.asset.gltf.writing import write_layered
 from facefolds_core.engines.usd import STAGE, export
-from facefolds_core.rendering import AssetCaster, composite
+from facefolds_core.rendering.reference import AssetCaster, composite, seen_from
 from tests.assets import make_asset
 from tests.engines.blender import REMEDY, find_blender, pictures
 from tests.engines.tracks import with_track
@@ -64,6 +64,6 @@ def test_the_add_on_plays_the_extensions_video(tmp_path: Path) -> None:
     found = pictures(tmp_path / "face.glb", cameras, GREY_VALUE, frame=FRAME)
     caster, textures, scores = AssetCaster(level), level.frame(FRAME), {}
     for camera in cameras:
-        expected = composite(caster.cast(level.camera_in_head(camera, FRAME)), textures, (GREY_VALUE,) * 3)[0]
+        expected = composite(caster.cast(seen_from(level, camera, FRAME)), textures, (GREY_VALUE,) * 3)[0]
         scores[camera.name] = psnr(found[camera.name], expected)
     assert min(scores.values()) >= AGREE, scores

@@ -15,7 +15,7 @@ from PIL import Image
 from facefolds_core.asset import Asset, read_asset
 from facefolds_core.engines.godot import CONTENTS, export
 from facefolds_core.geometry.torso import Torso
-from facefolds_core.rendering import render_asset
+from facefolds_core.rendering.reference import render_asset
 from tests.assets import make_asset
 from tests.engines.godot import errors, missing, pictures, run_godot, view_of
 from tests.engines.tracks import with_track

@@ -20,7 +20,7 @@ from facefolds_core.engines._folder import rgb_picture
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.quaternions import rotation
 from facefolds_core.geometry.track import Track
-from facefolds_core.rendering import AssetCaster
+from facefolds_core.rendering.reference import AssetCaster
 from tests.assets import SOURCE, make_asset
 from tests.engines import unity_shaders
 from tests.engines.unity_checks import PACKAGE, ROOT, SHADERS, STUBS, compiled, core, missing, run, spirv

@@ -30,8 +30,8 @@ from facefolds_core.params import (
     TextureParams,
 )
 from facefolds_core.pipeline.choices import write_choice
-from facefolds_core.rendering import composite
 from facefolds_core.rendering.raster import cast_layers
+from facefolds_core.rendering.reference import composite
 from facefolds_core.rendering.reflection import reflected_colours
 from tests.assets import grid_faces
 from tests.ellipsoids import Ellipsoids

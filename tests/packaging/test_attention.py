@@ -17,8 +17,8 @@ from facefolds_core.asset.video import decode_video, encode_video, pack_frame, u
 from facefolds_core.asset.writer import LevelContent
 from facefolds_core.packaging.attention import block_weights, merged, offsets, regions_of, views_of
 from facefolds_core.params import AttentionParams, VideoCodec
-from facefolds_core.rendering import composite
 from facefolds_core.rendering.raster import cast_layers
+from facefolds_core.rendering.reference import composite
 from tests.vectors import FRAMES, LAYERS, RATE, TEXELS, WINDOW, Waves, cameras, sheet
 
 USUAL = AttentionParams(strength=2.0)

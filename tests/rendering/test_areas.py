@@ -9,11 +9,10 @@ from typing import cast
 import numpy as np
 import pytest
 
-from facefolds_core.rendering import AssetCaster, composite
 from facefolds_core.rendering.areas import AreaView, view_of
 from facefolds_core.rendering.pixels import SIDE, finer, pixel_means, render
 from facefolds_core.rendering.raster import cast_layers
-from facefolds_core.rendering.reference import Layered
+from facefolds_core.rendering.reference import AssetCaster, Layered, composite
 from facefolds_core.rendering.reflection import reflected_colours
 from tests.assets import MOVING, Meshes, make_asset
 from tests.pictures import psnr

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from facefolds_core.geometry.sphere_uv import directions_to_uv, uv_to_st
-from facefolds_core.rendering import AssetCaster
+from facefolds_core.rendering.reference import AssetCaster
 from tests.assets import WINDOW, Meshes, cap_mesh
 from tests.scenes import CENTRE, first_hit, look_at_origin
 

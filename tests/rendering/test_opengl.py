@@ -22,11 +22,10 @@ from facefolds_core.cli import app
 from facefolds_core.cli.render import Kind, film_path, film_rate, parse_colour, parse_size, shrink
 from facefolds_core.errors import UserError
 from facefolds_core.geometry.torso import Torso
-from facefolds_core.rendering import AssetCaster, composite, render_asset
 from facefolds_core.rendering.camera_paths import Eye, camera_of, distance_to_fit, fly_through, frame_due, turntable
 from facefolds_core.rendering.opengl import OpenGLRenderer
-from facefolds_core.rendering.opengl_reflection import Glossy
 from facefolds_core.rendering.pixels import render
+from facefolds_core.rendering.reference import AssetCaster, composite, render_asset, seen_from
 from facefolds_core.rendering.reflection import reflected_colours
 from tests.asset.test_audio import tone
 from tests.assets import SOURCE, make_asset
@@ -63,7 +62,7 @@ def test_reflections_agree_with_the_reference(caps: Asset) -> None:
     hits, windows = AssetCaster(caps).cast(camera), caps.full.windows
     expected, _ = composite(hits, caps.frame(1), added=reflected_colours(hits, camera, windows, maps))
     plain, _ = composite(hits, caps.frame(1))
-    with OpenGLRenderer(caps, glossy=Glossy(maps, windows)) as renderer:
+    with OpenGLRenderer(caps, maps) as renderer:
         rgb, _ = renderer.render(camera, 1)
     assert psnr(rgb, expected) > 45
     assert psnr(plain, expected) < 25
@@ -71,12 +70,12 @@ def test_reflections_agree_with_the_reference(caps: Asset) -> None:
 
 def test_the_light_stays_with_the_room_where_the_head_turns(caps: Asset) -> None:
     level, camera, maps = with_track(caps.full, 40), look_at_origin("camera", 30, 10, 120), random_reflection()
-    seen_by, windows = level.camera_in_head(camera, 2), level.windows
+    seen_by, windows = seen_from(level, camera, 2), level.windows
     assert level.track is not None
     hits, turned = AssetCaster(level).cast(seen_by), level.track.at(2).rotation
     expected, _ = composite(hits, level.frame(2), added=reflected_colours(hits, seen_by, windows, maps, turned))
     along, _ = composite(hits, level.frame(2), added=reflected_colours(hits, seen_by, windows, maps))
-    with OpenGLRenderer(level, glossy=Glossy(maps, windows)) as renderer:
+    with OpenGLRenderer(level, maps) as renderer:
         rgb, _ = renderer.render(camera, 2)
     assert psnr(rgb, expected) > 45
     assert psnr(along, expected) < 25  # light that turns with the head is another picture

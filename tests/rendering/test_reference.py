@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from facefolds_core.rendering import AssetCaster, Hits, composite, render_asset
-from facefolds_core.rendering.reference import sample_texture
+from facefolds_core.rendering.reference import AssetCaster, Hits, composite, render_asset, sample_texture
 from tests.scenes import look_at_origin
 
 SIZE = 16

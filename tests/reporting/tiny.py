@@ -13,7 +13,7 @@ from facefolds_core.facts import fact
 from facefolds_core.files.paths import SubjectFolders
 from facefolds_core.files.writing import read_json, write_json, write_text
 from facefolds_core.params import section_of
-from facefolds_core.rendering import AssetCaster, composite
+from facefolds_core.rendering.reference import AssetCaster, composite
 from facefolds_core.scoring.films import FILMS, FilmFolder
 from facefolds_core.scoring.metrics import shown
 from facefolds_core.scoring.panels import METRICS, SUBJECT_METRICS, VARIANTS, ImageScore, Panel

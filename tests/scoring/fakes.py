@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from facefolds_core.asset import Asset
 from facefolds_core.captures.scene import Scene, read_scene, write_scene
 from facefolds_core.files.frame_store import write_frames
-from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.geometry.track import Track
 from facefolds_core.model import RadianceManifolds
@@ -84,9 +83,6 @@ class FlatAsset:
         st = np.array([[0, 0], [1, 0], [0, 1], [1, 1]], np.float32)
         vertices = np.stack([np.zeros(4), 0.7 * st[:, 0] - 0.35, 0.35 - 0.7 * st[:, 1]], 1).astype(np.float32)
         return (TexturedMesh(vertices, np.array([[0, 2, 1], [1, 2, 3]], np.int32), st),)
-
-    def camera_in_head(self, camera: Camera, time: float) -> Camera:
-        return camera if self.track is None else self.track.camera(camera, time)
 
     def reflection(self) -> None:
         return None

@@ -17,6 +17,7 @@ from facefolds_core.geometry.cameras import Camera
 from facefolds_core.rendering.areas import AreaView
 from facefolds_core.rendering.pixels import lit_hits, render
 from facefolds_core.rendering.raster import cast_layers
+from facefolds_core.rendering.reference import seen_from
 from tests.assets import MOVING, OVER_TORSO, make_asset
 from tests.pictures import GREY, GREY_VALUE, expected_means, expected_pictures, five_cameras, psnr
 from tests.viewer.conftest import NO_WEBCODECS, NewPlayer
@@ -173,7 +174,7 @@ def test_the_light_stays_with_the_room_where_the_head_turns(new_player: NewPlaye
     assert player.run("return await e.seek(v)", 2)
     for still in (False, True):
         player.run("e.still = v", still)
-        seen_by = camera if still else asset.camera_in_head(camera, 2)
+        seen_by = camera if still else seen_from(asset, camera, 2)
         expected, along = (shown(asset, seen_by, frame) for frame in (2, 0))
         assert psnr(player.capture(camera)[..., :3], expected) >= AGREE, still
         assert psnr(along, expected) < 36  # light that turns with the head is another picture
