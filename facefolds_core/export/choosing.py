@@ -51,30 +51,19 @@ TEXELS = (128, 192, 256, 384, 512, 768)
 """R^t that are tried, below that of the samples, which is tried, too."""
 
 
-@dataclass(frozen=True)
-class Look:
-    """A picture to compare with.
-
-    Attributes:
-        camera: in the head's own frame.
-        frame: index.
-        photo: (H, W, 3) in [0, 1].
-    """
-
-    camera: Camera
-    frame: int
-    photo: NDArray[np.float64]
+Look = tuple[Camera, int]
+"""A picture's camera, in the head's own frame, and frame."""
 
 
-def looks_of(scene: Scene) -> tuple[Split, list[Look]]:
-    """Pictures of cameras and frames, evenly spread; those of cameras for validation, where there are any."""
+def looks_of(scene: Scene) -> tuple[Split, list[tuple[Look, NDArray[np.uint8]]]]:
+    """Pictures (H, W, 3) of cameras and frames, evenly spread; those of cameras for validation, where there are any."""
     split: Split = "validate" if "validate" in scene.splits else "train"
     store = scene.open_frames()
     looks = []
     for camera in spread(scene.indices(split), CAMERAS, ends=False):
         seen = [k for k in range(scene.num_frames) if (camera, k) in store]
         for k in spread(seen, FRAMES, ends=False):
-            looks.append(Look(scene.camera_in_head(camera, k), k, store.image(camera, k) / 255.0))
+            looks.append(((scene.camera_in_head(camera, k), k), store.image(camera, k)))
     return split, looks
 
 
@@ -106,15 +95,16 @@ def _seen(
     """Of the cameras of the split by which things are chosen."""
     split, looks = looks_of(scene)
     rng, layers = np.random.default_rng(0), sorted({layer for layer, _ in textures})
-    images = {k: [textures.image(layer, k) for layer in layers] for k in {look.frame for look in looks}}
+    images = {k: [textures.image(layer, k) for layer in layers] for k in {k for (_, k), _ in looks}}
     found = []
-    for look in looks:
-        hits, own = _cast(scene, look, meshes), images[look.frame]
+    for look, image in looks:
+        camera, k = look
+        hits, own = _cast(scene, look, meshes), images[k]
         pixels = hits.choose(rng, RAYS)
-        photo = look.photo.reshape(-1, 3)[pixels]
+        photo = image.reshape(-1, 3)[pixels] / 255.0
         if reflection is not None:
-            to_room = None if scene.poses is None else scene.poses.at(look.frame).rotation
-            added = reflected_colours(hits, look.camera, windows, reflection, to_room)
+            to_room = None if scene.poses is None else scene.poses.at(k).rotation
+            added = reflected_colours(hits, camera, windows, reflection, to_room)
             shine = composite(hits, own, added=added)[0] - composite(hits, own)[0]
             photo = photo - shine.reshape(-1, 3)[pixels]
         found.append(Seen(look, pixels, hits.at(pixels), own, photo))
@@ -122,7 +112,8 @@ def _seen(
 
 
 def _cast(scene: Scene, look: Look, meshes: Sequence[TexturedMesh]) -> Hits:
-    return cast_layers(look.camera, layers_at(meshes, scene.poses, look.frame))
+    camera, k = look
+    return cast_layers(camera, layers_at(meshes, scene.poses, k))
 
 
 Picture = tuple[NDArray[np.float32], NDArray[np.float32]]
@@ -228,10 +219,10 @@ def choose_texels(scene: Scene, meshes: Sequence[TexturedMesh], grids: Grids, te
     candidates = [c for c in tried if AtlasLayout.pack([(c, c)] * len(meshes)).fits()] or tried[:1]
     scene = scene.with_torso(grids.torso)
     split, seen = _seen(scene, meshes, _windows(grids), grids.reflection, textures)
-    images = {s.look.frame: s.images for s in seen}
+    images = {s.look[1]: s.images for s in seen}
 
     def pictures(candidate: int) -> list[Picture]:
         small = {k: [resample(image, candidate) for image in frame] for k, frame in images.items()}
-        return [composite(s.hits, small[s.look.frame]) for s in seen]
+        return [composite(s.hits, small[s.look[1]]) for s in seen]
 
     return _least("texture.resolution", candidates, pictures, split, seen)

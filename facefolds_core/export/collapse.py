@@ -14,8 +14,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from facefolds_core.export.collapse_kernel import collapse
-from facefolds_core.export.quadrics_kernel import build_quadrics
+from facefolds_core.export.collapse_kernel import build_quadrics, collapse
 from facefolds_core.export.refit import refit_radii
 from facefolds_core.export.sheets import Array, sheet_faces, sheet_mesh, vertex_uv
 from facefolds_core.export.stores import Sheets

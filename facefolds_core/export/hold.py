@@ -109,22 +109,19 @@ def held_rows(
     weights: NDArray[np.float32],
     price: float,
     folder: Path,
-    memory: int = MEMORY,
-    window: int = WINDOW,
     kept: KeptFrames | None = None,
 ) -> Iterator[tuple[int, int, NDArray[np.uint8]]]:
     """All textures, held: part by part, and in each layer by layer.
 
     Args:
-        folder: where all frames of one layer and window lie meanwhile, if `memory` (bytes) cannot hold them.
-        window: frames that are held together.
+        folder: where all frames of one layer and window lie meanwhile, if `MEMORY` cannot hold them.
         kept: of an earlier run; parts that would be the same are taken over.
 
     Yields:
         (layer, frame, (S, S, 4) uint8).
     """
     layers, frames = (sorted({key[i] for key in textures.keys()}) for i in (0, 1))  # noqa: SIM118
-    made = parts(len(frames), window)
+    made = parts(len(frames), WINDOW)
     shown = {frames[own.start]: [frames[k] for k in around] for own, around in made}
     common = digest_of({"weights": weights, "price": price, "code": digest_of_packages("export")})
 
@@ -140,7 +137,7 @@ def held_rows(
     def make(own: Sequence[int], layer: int) -> Iterator[NDArray[np.uint8]]:
         around = shown[own[0]]
         first = around.index(own[0])
-        held = _held_layer(textures, layer, around, weights[layer], price, folder, memory)
+        held = _held_layer(textures, layer, around, weights[layer], price, folder)
         yield from (image for position, image in enumerate(held) if first <= position < first + len(own))
 
     earlier = KeptFrames(None) if kept is None else kept
@@ -156,11 +153,10 @@ def _held_layer(
     weights: NDArray[np.float32],
     price: float,
     folder: Path,
-    memory: int,
 ) -> Iterator[NDArray[np.uint8]]:
     """Some frames of a layer, held together."""
     shape = (len(frames), textures.height, textures.width, 4)
-    rows = max(1, min(textures.height, memory // (len(frames) * textures.width * 4)))
+    rows = max(1, min(textures.height, MEMORY // (len(frames) * textures.width * 4)))
     with TemporaryDirectory(dir=folder, prefix=".hold-") as scratch:
         images = (
             np.empty(shape, np.uint8)

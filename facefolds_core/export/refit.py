@@ -19,9 +19,8 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_matrix, diags
 from scipy.sparse.linalg import spsolve
 
-from facefolds_core.export.sheets import Array
+from facefolds_core.export.sheets import Array, vertex_uv
 from facefolds_core.export.stores import Sheets
-from facefolds_core.geometry.sphere_uv import st_to_uv
 from facefolds_core.kernels.jit import inlined, kernel
 
 STAY = 0.1
@@ -125,8 +124,7 @@ def radial_cosines(sheets: Sheets, layer: int) -> Array:
 
     Below a belt a step in u is as long everywhere, and the rays' own slant is left out.
     """
-    u0, u1, v0, v1 = (float(x) for x in sheets.window)
-    uv = st_to_uv(sheets.st, (u0, u1, v0, v1)) * (math.pi / 2)
+    uv = vertex_uv(sheets).reshape(sheets.st.shape) * (math.pi / 2)
     radii, belt = sheets.radii[layer].astype(np.float64), sheets.chart.belt
     logarithm = np.log(radii)
     down = np.gradient(logarithm, uv[:, 0, 0], axis=0)

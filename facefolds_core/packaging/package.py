@@ -34,16 +34,13 @@ from facefolds_core.geometry.sphere_uv import Window
 from facefolds_core.packaging.coding import coded_level, make_meter
 from facefolds_core.packaging.levels import coarse_content, is_streamed, stream_unit, write_rungs
 from facefolds_core.packaging.limits import Model, good_view
-from facefolds_core.packaging.poster import BACKGROUND, write_poster
+from facefolds_core.packaging.poster import BACKGROUND, JPEG_QUALITY, write_poster
 from facefolds_core.packaging.settings import level_params
 from facefolds_core.params import CompressParams, LevelParams
 from facefolds_core.spacing import spread
 
 POSTER_SIDE = 720
 """Longer side of the poster, pixels; no more than the capture's pictures have."""
-
-JPEG_QUALITY = 92
-"""Of poster and photos, on JPEG's scale."""
 
 
 @dataclass(frozen=True)
@@ -83,21 +80,20 @@ def package(folder: Path, export: Export, scene: Scene, params: CompressParams) 
         layers = crop_layers(export.meshes, export.windows, textures, frames, unit)
         full = LevelContent(layers, textures, frames, source.fps, unit)
         meter = make_meter(full, cameras)
-        levels = []
         if streamed:
-            *levels, level = write_rungs(temporary, full, params, meter, cameras)
+            levels = write_rungs(temporary, full, params, meter, cameras)
         else:
+            levels = []
             for coarse in params.levels:
                 content = coarse_content(full, export.windows, coarse, export.coarser[coarse.mesh_resolution])
                 coded = coded_level(temporary, coarse.name, content, level_params(params, coarse), meter, cameras)
                 levels.append(coded)
-            level = coded_level(temporary, FULL, full, level_params(params), meter, cameras)
+            levels.append(coded_level(temporary, FULL, full, level_params(params), meter, cameras))
         if export.reflection is not None:
             packed = pack_reflection(export.reflection)
             levels = [_with_reflection(temporary, one, *packed) for one in levels]
-            level = _with_reflection(temporary, level, *packed)
         photos = _photos(temporary, scene, params)
-        manifest = _with_extras(temporary, manifest_of(source, [*levels, level], temporary), scene, photos)
+        manifest = _with_extras(temporary, manifest_of(source, levels, temporary), scene, photos)
         if streamed:
             made, sound, stream = make_streams(temporary, manifest.levels, manifest.audio)
             manifest = manifest.model_copy(update={"levels": tuple(made), "audio": sound, "stream": stream})
@@ -131,17 +127,17 @@ def _with_extras(folder: Path, manifest: Manifest, scene: Scene, photos: Sequenc
         path, texture = folder / "audio.m4a", manifest.full.texture
         mime = encode_sound(path, scene.audio, texture.frames / texture.fps)
         update["audio"] = Audio(**stored_file(path).model_dump(), mime=mime)
-    train = scene.indices("train")
+    level, train = read_level(folder, manifest.full, read_track(folder, manifest)), scene.indices("train")
     if train:
         unseen = [scene.cameras[index] for index in scene.indices("holdout")]
         view = filmed_view([scene.cameras[index] for index in train], unseen)
         if view is not None:
-            level = read_level(folder, manifest.full, read_track(folder, manifest))
             view = view.model_copy(update={"good": good_view(Model.of(level), view)})
         update["view"] = view
     path, first = folder / "poster.jpg", scene.cameras[0]
     side = min(POSTER_SIDE, max(first.width, first.height))
-    camera = write_poster(path, manifest, side, JPEG_QUALITY)
+    assert manifest.bounds is not None
+    camera = write_poster(path, level, manifest.bounds, side)
     update["poster"] = Poster(**stored_file(path).model_dump(), **_taken_by(camera), background=BACKGROUND)
     return manifest.model_copy(update=update)
 

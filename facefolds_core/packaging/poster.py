@@ -8,9 +8,8 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from facefolds_core.asset.manifest import Bounds, Manifest
-from facefolds_core.asset.reader import read_level
-from facefolds_core.asset.track_file import read_track
+from facefolds_core.asset.manifest import Bounds
+from facefolds_core.asset.reader import AssetLevel
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.rendering.areas import view_of
 from facefolds_core.rendering.camera_paths import Eye, camera_of
@@ -19,6 +18,8 @@ FIELD_OF_VIEW, FILLED = 30.0, 0.92
 """Of the player's first view (viewer/src/view.js): degrees, and how much of a square the longer side takes."""
 BACKGROUND = (22 / 255, 24 / 255, 29 / 255)
 """The player's own (viewer/src/element.js), #16181d."""
+JPEG_QUALITY = 92
+"""Of poster and photos, on JPEG's scale."""
 MARGIN = 1.1
 """Picture beyond that square, for what stands nearer than the box's middle."""
 
@@ -42,16 +43,14 @@ def home_camera(bounds: Bounds, side: int) -> Camera:
     return Camera("poster", K, square.w2c, width, height)
 
 
-def write_poster(path: Path, manifest: Manifest, side: int, quality: int) -> Camera:
-    """Frame 0 of the full level with its reflection, over `BACKGROUND`: a JPEG. Returns its camera, in the world.
+def write_poster(path: Path, level: AssetLevel, bounds: Bounds, side: int) -> Camera:
+    """Frame 0 of a level with its reflection, over `BACKGROUND`: a JPEG. Returns its camera, in the world.
 
     Args:
-        path: beside the asset's other files, which are there already.
-        quality: 1..100.
+        bounds: of the asset.
+        side: pixels of the picture's longer side.
     """
-    assert manifest.bounds is not None
-    level = read_level(path.parent, manifest.full, read_track(path.parent, manifest))
-    camera = home_camera(manifest.bounds, side)
+    camera = home_camera(bounds, side)
     rgb, _ = view_of(level, camera).composite(level.frame(0), BACKGROUND)
-    Image.fromarray(np.rint(np.clip(rgb, 0, 1) * 255).astype(np.uint8)).save(path, quality=quality)
+    Image.fromarray(np.rint(np.clip(rgb, 0, 1) * 255).astype(np.uint8)).save(path, quality=JPEG_QUALITY)
     return camera

@@ -171,7 +171,7 @@ def test_cameras_for_validation_decide_where_there_are_any(tmp_path: Path, monke
     assert split == "train" and len(looks) == 3
     checked = replace(scene, splits=("train", "validate", "holdout", "train", "train"))
     split, looks = looks_of(checked)
-    assert split == "validate" and [look.camera.name for look in looks] == ["cam1"]
+    assert split == "validate" and [camera.name for (camera, _), _ in looks] == ["cam1"]
 
 
 def test_numbers_fix_both(tmp_path: Path) -> None:

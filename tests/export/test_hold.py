@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import combinations
 from pathlib import Path
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -103,7 +104,7 @@ def test_rays_that_may_show_anything_are_kept() -> None:
 
 
 @pytest.mark.parametrize("memory", [1 << 20, 8 * 16 * 4 * 3, 1])
-def test_what_shows_moves_and_what_does_not_stays(memory: int, tmp_path: Path) -> None:
+def test_what_shows_moves_and_what_does_not_stays(memory: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A trembling layer behind an opaque one becomes constant; the one in front, much looked at, stays as it is."""
     rng = np.random.default_rng(2)
     textures = rng.integers(100, 110, (2, 8, 16, 16, 4)).astype(np.uint8)
@@ -114,7 +115,8 @@ def test_what_shows_moves_and_what_does_not_stays(memory: int, tmp_path: Path) -
     store = FrameStore(path)
     weights = texel_weights(codes, store, 1)
     found = np.empty_like(textures)
-    for layer, frame, image in held_rows(store, weights, 1.0, tmp_path, memory):
+    monkeypatch.setattr("facefolds_core.export.hold.MEMORY", memory)
+    for layer, frame, image in held_rows(store, weights, 1.0, tmp_path):
         found[layer, frame] = image
     assert [p.name for p in tmp_path.iterdir()] == ["textures.arrow"]
     assert (found[0] == textures[0]).mean() > 0.99
@@ -139,7 +141,8 @@ def held(
     """One layer of images (K, 8, 8, 4)."""
     write_frames(folder / "t.arrow", (8, 8, 4), ((0, k, one) for k, one in enumerate(images)))
     weights, store = np.full((1, 8, 8, 2), weight, np.float32), FrameStore(folder / "t.arrow")
-    rows = list(held_rows(store, weights, 1.0, folder, 1 << 20, window, kept))
+    with patch("facefolds_core.export.hold.WINDOW", window):
+        rows = list(held_rows(store, weights, 1.0, folder, kept))
     if kept is not None:
         write_frames(folder / "held.arrow", (8, 8, 4), rows, packed=True)
         kept.keep(folder / "held.arrow")

@@ -12,7 +12,7 @@ import pytest
 from numpy.typing import NDArray
 from PIL import Image
 
-from facefolds_core.asset.manifest_file import parse_manifest
+from facefolds_core.asset import read_asset
 from facefolds_core.packaging.poster import BACKGROUND, FIELD_OF_VIEW, FILLED, write_poster
 from tests.assets import make_asset
 from tests.pictures import psnr
@@ -32,7 +32,8 @@ def asset(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("poster") / "asset"
     make_asset(folder, layers=3, frames=2, resolution=96)
     add_reflection(folder)
-    camera = write_poster(folder / "poster.jpg", parse_manifest(folder / "manifest.json"), 640, 92)
+    made = read_asset(folder)
+    camera = write_poster(folder / "poster.jpg", made, made.manifest.bounds, 640)
     poster = file_entry(folder / "poster.jpg") | view_of(camera) | {"background": list(BACKGROUND)}
     change_manifest(folder, lambda value: value.update(poster=poster))
     return folder
