@@ -134,7 +134,8 @@ def write_asset(
     frames = check_inputs(meshes, windows, textures)
     layers = crop_layers(meshes, windows, textures, frames)
     with atomic_folder(folder) as temporary:
-        level = write_level(temporary, FULL, LevelContent(layers, textures, frames, source.fps), params)
+        content = LevelContent(layers, textures, frames, source.fps)
+        level = write_level(temporary, FULL, content, params.mesh, params.video)
         return write_manifest(manifest_of(source, [level], temporary), temporary / MANIFEST_NAME)
 
 

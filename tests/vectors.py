@@ -165,7 +165,8 @@ def _write_short(folder: Path) -> None:
     textures = Resampled(full.textures, TEXELS // 2)
     layers = crop_layers([sheet(layer, 12) for layer in range(2)], [WINDOW] * 2, textures, FRAMES)
     small = LevelContent(layers, textures, FRAMES, RATE)
-    levels = [write_level(folder, "small", small, params), write_level(folder, FULL, full, params)]
+    both = {"small": small, FULL: full}
+    levels = [write_level(folder, name, one, params.mesh, params.video) for name, one in both.items()]
     write_manifest(manifest_of(source(), levels, folder), folder / MANIFEST_NAME)
 
 

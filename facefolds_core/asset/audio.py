@@ -13,13 +13,13 @@ import numpy as np
 from av.error import FFmpegError
 from numpy.typing import NDArray
 
+from facefolds_core.asset.video import CHECKED, NO_ROOM, written
 from facefolds_core.errors import UserError
 
 AAC_BITS_A_SECOND = 128_000
 AAC_FRAME = 1024
 """Samples that the encoder takes at once."""
 AAC_MIME = 'audio/mp4; codecs="mp4a.40.2"'
-STRICT = {"err_detect": "crccheck+bitstream+buffer+explode"}
 FORMATS = {"format_whitelist": "wav,mov,mp4,m4a,3gp,3g2,mj2,mp3,ogg,flac"}
 """Sound files, none of them able to name another file."""
 LONGER = 60.0
@@ -35,8 +35,8 @@ def encode_sound(path: Path, source: Path, seconds: float) -> str:
     try:
         # Never a guess of FFmpeg's: it knows kinds that open other files.
         with (
-            av.open(f"file:{source}", container_options=STRICT | FORMATS) as given,
-            av.open(str(path), "w", format="mp4", options={"fflags": "bitexact", "movflags": "faststart"}) as made,
+            av.open(f"file:{source}", container_options=CHECKED | FORMATS) as given,
+            written(path, "mp4") as made,
         ):
             if not given.streams.audio:
                 raise _unreadable(source, "it has no audio stream")
@@ -48,7 +48,7 @@ def encode_sound(path: Path, source: Path, seconds: float) -> str:
                 made.mux(sound.encode(frame))
             made.mux(sound.encode(None))
     except FFmpegError as error:
-        if error.errno in (28, 122):  # disk full, quota: reported as such by the stage
+        if error.errno in NO_ROOM:
             raise
         raise _unreadable(source, str(error)) from None
     return AAC_MIME
@@ -72,10 +72,9 @@ def write_film_with_sound(path: Path, film: Path, source: Path, sequence: Fracti
         sequence: seconds of the sequence: what the sound has beyond them is not heard; after its own end it is still.
         first: seconds of the sequence at which the film begins.
     """
-    made_options = {"fflags": "bitexact", "movflags": "faststart"}
-    with av.open(f"file:{source}", container_options=STRICT | FORMATS) as given:
+    with av.open(f"file:{source}", container_options=CHECKED | FORMATS) as given:
         once, rate, layout = _heard_once(given, sequence)
-    with av.open(str(film)) as shown, av.open(str(path), "w", format="mp4", options=made_options) as made:
+    with av.open(str(film)) as shown, written(path, "mp4") as made:
         pictures: Any = shown.streams.video[0]
         sound: Any = made.add_stream("aac", rate=rate, layout=layout)
         sound.codec_context.bit_rate = AAC_BITS_A_SECOND
@@ -117,11 +116,11 @@ def _part(once: NDArray[np.float32], start: int, first: int, rate: int, layout: 
 def sound_problem(path: Path, seconds: float) -> str | None:
     """What is wrong with a sound file of a sequence of `seconds`, in words; None if it decodes whole, strictly."""
     try:
-        with av.open(f"file:{path}", container_options=STRICT | FORMATS) as source:
+        with av.open(f"file:{path}", container_options=CHECKED | FORMATS) as source:
             if not source.streams.audio:
                 return "it has no audio stream"
             stream = source.streams.audio[0]
-            stream.codec_context.options = STRICT
+            stream.codec_context.options = CHECKED
             samples = 0
             for frame in source.decode(stream):
                 samples += frame.samples

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from facefolds_core.asset.manifest import Coordinates, Level, Manifest
-from facefolds_core.asset.manifest_base import Row, Vector
+from facefolds_core.asset.manifest_base import FARTHEST, Row, Vector
 from facefolds_core.asset.manifest_file import MANIFEST_NAME, seal_is_whole
 from facefolds_core.asset.packing import MAX_PIXELS, MAX_SIDE, AtlasLayout, inside
 from facefolds_core.asset.segments import segment_problems
@@ -22,8 +22,6 @@ from facefolds_core.geometry.cameras import is_rotation
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.geometry.sphere_uv import Window
 
-FARTHEST = 1e3
-"""Units from the origin."""
 SMALLEST = 1e-6
 """Units, of a mesh's longest side."""
 FPS_RANGE = (1e-3, 1e3)
@@ -67,10 +65,9 @@ def manifest_problems(path: Path, manifest: Manifest) -> list[str]:
         late = [f"frame {photo.frame} of {frames}"] * (photo.frame >= frames)
         problems += [f"{photo.file}: {problem}" for problem in late + _camera_problems(photo.K, photo.w2c)]
     problems += _poster_problems(manifest)
-    pictures = [*manifest.photos, *([manifest.poster] if manifest.poster else [])]
     problems += [
         f"{picture.file}: {problem}"
-        for picture in pictures
+        for picture in manifest.pictures
         for problem in _size_problems(picture.width, picture.height)
     ]
     names = [MANIFEST_NAME, *(name for name, _, _ in manifest.files())]

@@ -11,6 +11,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO, Literal
 
+import numpy as np
+
 EBML = b"\x1a\x45\xdf\xa3"
 DOCTYPE_WEBM = b"\x42\x82\x84webm"
 PARENTS = {b"moov", b"trak", b"mdia", b"minf", b"stbl", b"moof", b"traf"}
@@ -120,11 +122,11 @@ def _check_table(file: BinaryIO, kind: bytes, inside: int, end: int, size: int) 
     entry = ENTRY_BYTES[kind]
     if count * entry > len(content) - 8:
         raise ContainerError(f"its table {name} claims {count} entries")
-    if kind in (b"stts", b"ctts"):
-        total = sum(struct.unpack_from(">I", content, 8 + entry * index)[0] for index in range(count))
-    elif kind == b"stsc":
-        total = max((struct.unpack_from(">I", content, 12 + entry * index)[0] for index in range(count)), default=0)
-    else:
-        total = 0
+    numbers = np.frombuffer(content, ">u4", count * entry // 4, 8).reshape(count, entry // 4).astype(np.int64)
+    total = 0
+    if kind in (b"stts", b"ctts"):  # runs of pictures
+        total = int(numbers[:, 0].sum())
+    elif kind == b"stsc":  # pictures of each chunk
+        total = int(numbers[:, 1].max(initial=0))
     if total > size:
         raise ContainerError(f"its table {name} claims {total} pictures")

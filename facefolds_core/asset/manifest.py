@@ -29,7 +29,7 @@ from facefolds_core.asset.manifest_base import (
     StoredFile,
     Vector,
 )
-from facefolds_core.asset.manifest_extras import Audio, FilmedView, Photo, Poster, StandingTorso, Stream
+from facefolds_core.asset.manifest_extras import Audio, FilmedView, Photo, Picture, Poster, StandingTorso, Stream
 from facefolds_core.geometry.similarity import Similarity
 
 FORMAT_VERSION, LEAST_VERSION = 4, 3
@@ -262,6 +262,11 @@ class Manifest(Part):
     @property
     def full(self) -> Level:
         return self.levels[-1]
+
+    @property
+    def pictures(self) -> list[Picture]:
+        """Photos and poster."""
+        return [*self.photos, *([] if self.poster is None else [self.poster])]
 
     def files(self) -> list[tuple[str, int, str]]:
         """(name, bytes, sha256) of every file but the manifest, each once."""

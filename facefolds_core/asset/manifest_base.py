@@ -20,6 +20,9 @@ Rect = tuple[Offset, Offset, Count, Count]
 Vector = tuple[float, float, float]
 Row = tuple[float, float, float, float]
 
+FARTHEST = 1e3
+"""Units that anything of an asset may lie from the origin."""
+
 ABSENT = "x-absent"
 """Marks keys of the schema that are there with a value or not at all."""
 

@@ -18,7 +18,7 @@ import av
 
 from facefolds_core.asset.codecs import Codec
 from facefolds_core.asset.regions import Region
-from facefolds_core.asset.video import FORMATS, Picture, encode_video
+from facefolds_core.asset.video import FORMATS, Picture, encode_video, written
 from facefolds_core.system.threads import in_order
 
 
@@ -57,10 +57,9 @@ def encode_parts(
 
 def _join(path: Path, files: Sequence[Path], rate: Fraction, codec: Codec) -> None:
     """One file of the parts' packets, numbered through."""
-    muxer = {"fflags": "bitexact"} | ({"movflags": "faststart"} if codec.container == "mp4" else {})
     with ExitStack() as open_files:
         first = open_files.enter_context(_opened(files[0], codec))
-        out: Any = open_files.enter_context(av.open(str(path), "w", format=codec.container, options=muxer))
+        out = open_files.enter_context(written(path, codec.container))
         copy = out.add_stream_from_template(first.streams.video[0], opaque=True)
         copy.time_base = 1 / rate
         header = bytes(first.streams.video[0].codec_context.extradata or b"")

@@ -35,20 +35,18 @@ Frame = tuple[NDArray[np.uint8], ...]
 
 @dataclass(frozen=True)
 class AssetLevel:
-    """One level of detail of an asset; its video is decoded on demand.
+    """One level of detail of an asset; its first video is decoded on demand.
 
     Attributes:
         folder: where the asset lies.
         entry: its part of the manifest.
         layers: N meshes, outermost first.
-        video: index of the video that is decoded.
         track: the meshes' motion as a whole; None where they stand still.
     """
 
     folder: Path
     entry: Level
     layers: tuple[TexturedMesh, ...]
-    video: int = 0
     track: Track | None = None
 
     @property
@@ -101,7 +99,7 @@ class AssetLevel:
 
     @property
     def _path(self) -> Path:
-        return self.folder / self.entry.texture.videos[self.video].file
+        return self.folder / self.entry.texture.videos[0].file
 
     def pictures(self, start: int = 0) -> Iterator[Picture]:
         """The video's planar pictures from frame `start` on, decoded as they are asked for.
@@ -110,7 +108,7 @@ class AssetLevel:
             UserError: if the video is damaged, or not the one that the manifest names.
         """
         texture = self.entry.texture
-        video = texture.videos[self.video]
+        video = texture.videos[0]
         if video.segments is not None:
             return decode_segments(self.folder, video, texture, start)
         refuse_changed(self.folder, video)

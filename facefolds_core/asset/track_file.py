@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from facefolds_core.asset.manifest import REMEDY, Manifest
-from facefolds_core.asset.manifest_base import StoredFile
+from facefolds_core.asset.manifest_base import FARTHEST, StoredFile
 from facefolds_core.asset.stored import read_slice
 from facefolds_core.errors import UserError
 from facefolds_core.geometry.track import Track
@@ -21,9 +21,6 @@ TRACK_NAME = "track.bin"
 NUMBERS = 7
 """Of a pose."""
 POSE_BYTES = 4 * NUMBERS
-
-FARTHEST = 1e3
-"""Units that a head may be away."""
 LEAST_BAND = 1e-6
 """Units."""
 

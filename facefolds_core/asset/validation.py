@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from facefolds_core.asset.audio import sound_problem
 from facefolds_core.asset.checks import manifest_problems, mesh_problems
+from facefolds_core.asset.colour import NEUTRAL
 from facefolds_core.asset.draco import DracoError, decode_mesh, degenerate_faces
 from facefolds_core.asset.manifest import Layer, Level, Manifest, Reflection, Texture, Video
 from facefolds_core.asset.manifest_extras import Picture as StoredPicture
@@ -18,13 +19,12 @@ from facefolds_core.asset.reader import layer_bytes
 from facefolds_core.asset.segments import decode_segments, probe_segments
 from facefolds_core.asset.stored import check_file, leads_out
 from facefolds_core.asset.track_file import track_problems
-from facefolds_core.asset.video import Picture, decode_video, probe_video
+from facefolds_core.asset.video import BT709_LIMITED, Picture, decode_video, planes, probe_video
 from facefolds_core.errors import UserError
 from facefolds_core.files.pictures import DamagedPictureError, open_picture, picture_size
 from facefolds_core.files.reading import is_folder
 from facefolds_core.geometry.meshes import TexturedMesh
 
-_BT709_LIMITED = (1, 1)
 _COLOURFUL = 24
 """Codes off neutral that the chroma of the alpha image may be, by the codec's error."""
 _MOST_STRAYS = 20
@@ -90,10 +90,7 @@ def _content_problems(folder: Path, manifest: Manifest, whole: set[str]) -> Iter
     if track is not None and track.file in whole:
         data = (folder / track.file).read_bytes()
         yield from (f"{track.file}: {problem}" for problem in track_problems(manifest, data))
-    pictures: list[StoredPicture | Reflection] = [
-        *manifest.photos,
-        *([manifest.poster] if manifest.poster else []),
-    ]
+    pictures: list[StoredPicture | Reflection] = [*manifest.pictures]
     pictures += [level.reflection for level in manifest.levels if level.reflection]
     for picture in pictures:
         if picture.file in whole:
@@ -164,7 +161,7 @@ def _video_problems(folder: Path, video: Video, texture: Texture) -> list[str]:
             ("frames a second", facts.rate, texture.rate),
         ]
         problems = [f"{name} {found}, the manifest says {said}" for name, found, said in pairs if found != said]
-        if facts.tags != _BT709_LIMITED:
+        if facts.tags != BT709_LIMITED:
             problems.append(f"its colour tags (matrix, range) are {facts.tags}, not BT.709 and limited")
         if problems:
             return problems
@@ -187,10 +184,9 @@ def _video_problems(folder: Path, video: Video, texture: Texture) -> list[str]:
 
 def _colourful(picture: Picture, texture: Texture) -> bool:
     """Whether more than one in a hundred pixels of the alpha image has a hue: it should have none."""
-    height, width = texture.height, texture.width
     x, y, w, h = (number // 2 for number in texture.alpha_rect)
-    chroma = picture[height:].reshape(2, height // 2, width // 2)[:, y : y + h, x : x + w]
-    return bool((np.abs(chroma.astype(np.int16) - 128) > _COLOURFUL).any(0).mean() > 0.01)
+    chroma = np.stack(planes(picture)[1:])[:, y : y + h, x : x + w]
+    return bool((np.abs(chroma.astype(np.int16) - NEUTRAL) > _COLOURFUL).any(0).mean() > 0.01)
 
 
 def _picture_problems(path: Path, said: StoredPicture | Reflection) -> list[str]:

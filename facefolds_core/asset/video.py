@@ -7,6 +7,7 @@ codecs.
 
 from __future__ import annotations
 
+import errno
 import os
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
@@ -25,6 +26,7 @@ from facefolds_core.asset.codecs import CODECS, Codec, Stream
 from facefolds_core.asset.colour import (
     BLACK,
     NEUTRAL,
+    Plane,
     alpha_to_luma,
     luma_to_alpha,
     rgb_to_yuv420,
@@ -39,8 +41,13 @@ from facefolds_core.system.scheduling import kept_scheduling
 _PRIMARIES_BT709 = 1
 _TRANSFER_SRGB = 13  # IEC 61966-2-1 in ITU-T H.273
 
-STRICT = {"err_detect": "crccheck+bitstream+buffer+explode", "max_pixels": str(MAX_PIXELS)}
+CHECKED = {"err_detect": "crccheck+bitstream+buffer+explode"}
 """Damage is an error: nothing is made up in its place. What H.264's decoder conceals all the same, it marks."""
+STRICT = CHECKED | {"max_pixels": str(MAX_PIXELS)}
+NO_ROOM = (errno.ENOSPC, errno.EDQUOT)
+"""A full disk or quota, which stages report as such: no fault of what is written."""
+BT709_LIMITED = (1, 1)
+"""Matrix and range of an asset's videos, as `VideoFacts.tags`."""
 FORMATS = {"mp4": "mp4", "webm": "matroska"}
 """Container -> FFmpeg's demuxer: never one of its guesses, some of which open other files."""
 
@@ -90,17 +97,28 @@ def pack_frame(textures: Sequence[NDArray[np.uint8]], layout: AtlasLayout) -> Pi
     return np.concatenate([y, cb.reshape(-1, width), cr.reshape(-1, width)])
 
 
+def planes(picture: Picture) -> tuple[Plane, Plane, Plane]:
+    """Y (height, width), Cb and Cr (height / 2, width / 2)."""
+    height, width = 2 * len(picture) // 3, picture.shape[1]
+    cb, cr = picture[height:].reshape(2, height // 2, width // 2)
+    return picture[:height], cb, cr
+
+
 def unpack_picture(picture: Picture, layout: AtlasLayout) -> tuple[NDArray[np.uint8], ...]:
     """A decoded picture -> the layers' textures, N of (h, w, 4) RGBA."""
-    height, width = layout.height, layout.width
-    y = picture[:height]
-    cb, cr = picture[height:].reshape(2, height // 2, width // 2)
+    y, cb, cr = planes(picture)
     x0, y0, w, h = layout.colour_rect
     half = (slice(y0 // 2, (y0 + h) // 2), slice(x0 // 2, (x0 + w) // 2))
     colour = yuv420_to_rgb(y[y0 : y0 + h, x0 : x0 + w], cb[half], cr[half])
     x1, y1, _, _ = layout.alpha_rect
     alpha = luma_to_alpha(y[y1 : y1 + h, x1 : x1 + w])
     return cut(np.concatenate([colour, alpha[..., None]], -1), layout.rects)
+
+
+def written(path: Path, container: str) -> Any:
+    """A file to write packets to, of a kind of `FORMATS`: PyAV's container. The same packets give the same bytes."""
+    faststart = {"movflags": "faststart"} if container == "mp4" else {}
+    return av.open(str(path), "w", format=container, options={"fflags": "bitexact"} | faststart)
 
 
 def encode_video(
@@ -123,9 +141,8 @@ def encode_video(
     """
     count, mark = 0, Marker(size, fps, regions) if regions else None
     os.environ.setdefault("SVT_LOG", "1")  # SVT-AV1 writes to stderr by itself; 1: errors only
-    muxer = {"fflags": "bitexact"} | ({"movflags": "faststart"} if codec.container == "mp4" else {})
     try:
-        with av.open(str(path), "w", format=codec.container, options=muxer) as container:
+        with written(path, codec.container) as container:
             stream: Any = container.add_stream(codec.encoder, rate=fps, options=options)
             _describe(stream, size, fps)
             with kept_scheduling():
@@ -138,7 +155,7 @@ def encode_video(
                 count += 1
             container.mux(stream.encode(None))
     except FFmpegError as error:
-        if error.errno in (28, 122):  # disk full, quota: reported as such by the stage
+        if error.errno in NO_ROOM:
             raise
         raise UserError(
             "the video encoder refused the textures",
@@ -177,7 +194,7 @@ def _opened(path: Path, part: BinaryIO | None = None) -> Iterator[tuple[Any, Any
         with av.open(
             f"file:{path}" if part is None else part,
             format=FORMATS[kind],
-            container_options={"err_detect": STRICT["err_detect"]},
+            container_options=CHECKED,
             stream_options=cast(Any, [STRICT]),
         ) as container:
             if not container.streams.video:

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,15 +43,6 @@ STATIC_FPS = 1.0
 """Written for a static scene, whose one frame has no rate."""
 FULL = "full"
 """Name of the level that holds everything."""
-
-
-class AssetSettings(Protocol):
-    """How an asset is encoded: the section `compress` of params.yaml, or anything else with these."""
-
-    @property
-    def mesh(self) -> MeshSettings: ...
-    @property
-    def video(self) -> VideoSettings: ...
 
 
 @dataclass(frozen=True)
@@ -163,7 +153,8 @@ def write_level(
     folder: Path,
     name: str,
     content: LevelContent,
-    params: AssetSettings,
+    mesh: MeshSettings,
+    video: VideoSettings,
     crfs: Mapping[CodecName, int] | None = None,
     shared: Level | None = None,
     regions: Sequence[Region] = (),
@@ -172,7 +163,7 @@ def write_level(
     """Write the files of one level into `folder`: NAME_meshes.bin, NAME.mp4 ...; returns its part of the manifest.
 
     Args:
-        crfs: codec -> factor on the encoder's own scale; by default what `params.video.crf` means for it.
+        crfs: codec -> factor on the encoder's own scale; by default what `video.crf` means for it.
         shared: a level of the same layers whose meshes are this one's, too.
         regions: of the picture, coded finer or coarser.
         encoded: videos that are made already.
@@ -182,24 +173,24 @@ def write_level(
     """
     layout = content.layout
     if shared is None:
-        meshes, entries = _write_layers(folder / f"{name}_meshes.bin", content.layers, layout, params)
+        meshes, entries = _write_layers(folder / f"{name}_meshes.bin", content.layers, layout, mesh)
     else:
         meshes = shared.meshes[0]
         pairs = zip(shared.layers, layout.rects, strict=True)
         entries = tuple(layer.model_copy(update={"texture_rect": rect}) for layer, rect in pairs)
     videos = []
-    for codec in (CODECS[codec] for codec in params.video.codec):
+    for codec in (CODECS[codec] for codec in video.codec):
         path = folder / f"{name}.{codec.container}"
         # Two codecs may share a container: the first has the plain name.
         path = path if not path.exists() else path.with_name(f"{name}_{codec.name}.{codec.container}")
-        crf = codec.crf(params.video.crf) if crfs is None else crfs[codec.name]
         if encoded and codec.name in encoded:
             shutil.copyfile(encoded[codec.name], path)
         else:
-            content.encode(path, codec, params.video, crf, regions=regions)
+            crf = crfs[codec.name] if crfs else codec.crf(video.crf)
+            content.encode(path, codec, video, crf, regions=regions)
         stored, facts = stored_file(path).model_dump(), probe_video(path)
-        video = Video(**stored, container=codec.container, codec=codec.name, mime=facts.mime, level=facts.level)
-        videos.append(video)
+        one = Video(**stored, container=codec.container, codec=codec.name, mime=facts.mime, level=facts.level)
+        videos.append(one)
     texture = Texture(
         width=layout.width,
         height=layout.height,
@@ -207,20 +198,20 @@ def write_level(
         alpha_rect=layout.alpha_rect,
         frames=content.frames,
         frame_rate=content.rate.as_integer_ratio(),
-        keyframes=tuple(sorted(set.intersection(*(set(key_frames(folder / video.file)) for video in videos)))),
+        keyframes=tuple(sorted(set.intersection(*(set(key_frames(folder / one.file)) for one in videos)))),
         videos=tuple(videos),
     )
-    size = meshes.bytes + sum(video.bytes for video in videos)
+    size = meshes.bytes + sum(one.bytes for one in videos)
     return Level(name=name, meshes=(meshes,), layers=entries, texture=texture, bytes=size)
 
 
 def _write_layers(
-    path: Path, layers: Sequence[CroppedLayer], layout: AtlasLayout, params: AssetSettings
+    path: Path, layers: Sequence[CroppedLayer], layout: AtlasLayout, settings: MeshSettings
 ) -> tuple[StoredFile, tuple[Layer, ...]]:
     """All meshes of a level in one file, one after the other: a player asks for it once."""
     entries, content = [], bytearray()
     for layer, rect in zip(layers, layout.rects, strict=True):
-        data, decoded = encode_mesh(layer.mesh, params.mesh)
+        data, decoded = encode_mesh(layer.mesh, settings)
         entry = Layer(
             mesh=path.name,
             offset=len(content),

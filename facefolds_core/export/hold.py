@@ -109,7 +109,7 @@ def held_rows(
     weights: NDArray[np.float32],
     price: float,
     folder: Path,
-    kept: KeptFrames | None = None,
+    kept: KeptFrames,
 ) -> Iterator[tuple[int, int, NDArray[np.uint8]]]:
     """All textures, held: part by part, and in each layer by layer.
 
@@ -140,10 +140,9 @@ def held_rows(
         held = _held_layer(textures, layer, around, weights[layer], price, folder)
         yield from (image for position, image in enumerate(held) if first <= position < first + len(own))
 
-    earlier = KeptFrames(None) if kept is None else kept
     with progress(total=len(made) * len(layers), desc="hold", unit="layer") as bar:
         groups = [[frames[k] for k in own] for own, _ in made]
-        yield from earlier.groups(groups, layers, digest, make, lambda: bar.update())
+        yield from kept.groups(groups, layers, digest, make, lambda: bar.update())
 
 
 def _held_layer(

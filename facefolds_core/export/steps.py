@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -75,28 +75,19 @@ def sample_model(
     return replace(grids, opacity=opacity, reflection=model.reflection_maps(), torso=model.torso)
 
 
-@dataclass(frozen=True)
-class Decimated:
-    """Attributes:
-    meshes: of all layers, outermost first.
-    coarser: R^m asked for -> the meshes of a coarser level, never finer than `meshes`.
-    why: how R^m was chosen; None where it was given.
-    """
-
-    meshes: list[TexturedMesh]
-    coarser: dict[int, list[TexturedMesh]]
-    why: Fact | None
-
-
 def decimate_all(
     surfaces: Surfaces, grids: Grids, scene: Scene, samples: Path, params: DecimateParams, levels: Sequence[int]
-) -> Decimated:
+) -> tuple[list[TexturedMesh], dict[int, list[TexturedMesh]], Fact | None]:
     """The meshes that ship, and those of the coarser levels of detail.
 
     Args:
         scene: whose photos decide where `resolution` is "auto".
         samples: frame store of the textures as they were sampled.
         levels: R^m of the coarser levels.
+
+    Returns:
+        meshes of all layers, outermost first; R^m of a coarser level -> its meshes, never finer than those; and how R^m
+        was chosen, None where it was given.
     """
     given = params.resolution
     tried = MESHES if given == "auto" else (given,)
@@ -107,7 +98,7 @@ def decimate_all(
     else:
         ladder = {r: decimate_layers(surfaces, grids, r, params) for r in wanted}
     chosen, why = (given, None) if given != "auto" else choose_meshes(scene, ladder, grids, FrameStore(samples))
-    return Decimated(ladder[chosen], {r: ladder[min(r, chosen)] for r in levels}, why)
+    return ladder[chosen], {r: ladder[min(r, chosen)] for r in levels}, why
 
 
 def texels_for(
@@ -157,7 +148,7 @@ def bake(
     rays = shown_rays(cameras, meshes, grids.opacity)
     weights = texel_weights(rays, store, len(cameras))
     earlier = KeptFrames(kept)
-    rows = held_rows(store, weights, params.hold, folder, kept=earlier)
+    rows = held_rows(store, weights, params.hold, folder, earlier)
     write_frames(path, (store.height, store.width, 4), rows, packed=True)
     earlier.keep(path)
     return len(rays)

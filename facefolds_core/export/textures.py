@@ -7,7 +7,6 @@ player interpolates colour and alpha apart, and because the video codec spends n
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from functools import lru_cache
 from pathlib import Path
 
@@ -90,18 +89,6 @@ def fill_colour(premultiplied: Float, shown: NDArray[np.bool_]) -> Float:
     return np.asarray(colour, np.float32)
 
 
-def texture_rows(store: FrameStore, size: int) -> Iterator[tuple[int, int, Image]]:
-    """All textures of a complete layered store, resampled: frame by frame, layers from the outermost in.
-
-    Yields:
-        (layer, frame, (size, size, 4) uint8).
-    """
-    last = store.keys()[-1]
-    for frame in progress(range(last[1] + 1), desc="textures", unit="frame"):
-        for layer in range(last[0] + 1):
-            yield layer, frame, resample(store.image(layer, frame), size)
-
-
 def resample_store(source: Path, target: Path, size: int) -> FrameStore:
     """Resample a layered frame store (camera := layer) to `size` x `size`; returns the source.
 
@@ -109,6 +96,8 @@ def resample_store(source: Path, target: Path, size: int) -> FrameStore:
         UserError: if the source is missing, damaged, or not a complete set of square RGBA images.
     """
     store = FrameStore(source)
-    check_textures(store)
-    write_frames(target, (size, size, 4), texture_rows(store, size), packed=True)
+    frames, layers = check_textures(store), store.keys()[-1][0] + 1
+    each = progress(range(frames), desc="textures", unit="frame")
+    rows = ((layer, k, resample(store.image(layer, k), size)) for k in each for layer in range(layers))
+    write_frames(target, (size, size, 4), rows, packed=True)
     return store

@@ -26,7 +26,8 @@ from facefolds_core.rendering.reference import Hits, Texture
 from facefolds_core.spacing import spread
 
 LEAST = 0.01
-"""What shows less than this share of what shows most counts as that much: someone may look from elsewhere."""
+"""What shows less than this share of what shows most (the 95th percentile) counts as that much: someone may look from
+where no camera stood."""
 
 CAMERAS = 24
 """Training cameras that are looked through, evenly spread."""
@@ -107,11 +108,7 @@ def _add_weights(
 
 
 def offsets(weights: Weights, strength: float) -> NDArray[np.int64]:
-    """Steps of the quantiser for each macroblock, about none in the (geometric) mean of what shows.
-
-    What shows less than `LEAST` of what shows most (the 95th percentile) is treated as if it showed as much: someone
-    may look from where no camera stood.
-    """
+    """Steps of the quantiser for each macroblock, about none in the (geometric) mean of what shows."""
     if not (weights > 0).any():
         return np.zeros(weights.shape, np.int64)
     floor = LEAST * float(np.quantile(weights[weights > 0], 0.95))

@@ -56,7 +56,7 @@ def coded_level(
                 crfs[codec.name] = crf
                 if content.frames <= rate.FRAMES and not content.part_frames:
                     encoded[codec.name] = _trial(Path(scratch), codec, crf)
-        level = write_level(folder, name, content, params, crfs or None, shared, regions, encoded)
+        level = write_level(folder, name, content, params.mesh, video, crfs, shared, regions, encoded)
     if meter is None:
         return level
     shown = read_level(folder, level)

@@ -17,15 +17,14 @@ def decimate(folders: SubjectFolders) -> str:
     surfaces = read_surfaces(folders.surfaces / "surfaces.npz")
     grids = read_grids(folders.samples / "grids.npz")
     levels = read_level_resolutions(folders.config)
-    made = steps.decimate_all(
+    meshes, coarse, chosen = steps.decimate_all(
         surfaces, grids, read_scene(folders.scene), folders.samples / steps.TEXTURES, params, levels
     )
-    meshes = made.meshes
     with atomic_folder(folders.meshes) as temporary:
         write_meshes(temporary / "meshes.npz", meshes)
-        for resolution, coarser in made.coarser.items():
+        for resolution, coarser in coarse.items():
             write_meshes(temporary / f"level_{resolution}.npz", coarser)
-        why = write_choice(temporary, made.why)
+        why = write_choice(temporary, chosen)
     vertices, triangles = sum(len(m.vertices) for m in meshes), sum(len(m.faces) for m in meshes)
-    coarse = "".join(f"; R^m {r}: {sum(len(m.faces) for m in found)} triangles" for r, found in made.coarser.items())
-    return f"{len(meshes)} meshes, {vertices} vertices, {triangles} triangles{coarse}; in {folders.meshes}{why}"
+    others = "".join(f"; R^m {r}: {sum(len(m.faces) for m in found)} triangles" for r, found in coarse.items())
+    return f"{len(meshes)} meshes, {vertices} vertices, {triangles} triangles{others}; in {folders.meshes}{why}"

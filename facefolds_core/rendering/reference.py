@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -99,22 +99,29 @@ class AssetCaster:
         return Hits(hit.reshape(image), st.reshape(*image, 2))
 
 
+def texels_around(st: NDArray[np.float32], width: int, height: int) -> tuple[NDArray[Any], ...]:
+    """Of places (M, 2): left, right, top and bottom of the four texels around, clamped; the shares of right and bottom.
+
+    Texel (row i, column j) has its centre at s = (j + 0.5) / width, t = (i + 0.5) / height.
+    """
+    x = np.clip(st[:, 0] * np.float64(width) - 0.5, 0, width - 1)
+    y = np.clip(st[:, 1] * np.float64(height) - 0.5, 0, height - 1)
+    left, top = x.astype(np.intp), y.astype(np.intp)
+    return left, np.minimum(left + 1, width - 1), top, np.minimum(top + 1, height - 1), x - left, y - top
+
+
 def sample_texture(texture: Texture, st: NDArray[np.float32]) -> Image:
     """Bilinear look-up, clamped to the edge texels' centres.
 
     Args:
-        texture: (H, W, C) uint8; texel (row i, column j) has its centre at s = (j + 0.5) / W, t = (i + 0.5) / H.
+        texture: (H, W, C) uint8.
         st: (M, 2), s right and t down.
 
     Returns:
         (M, C) float32 in [0, 1].
     """
-    height, width = texture.shape[:2]
-    x = np.clip(st[:, 0] * np.float64(width) - 0.5, 0, width - 1)
-    y = np.clip(st[:, 1] * np.float64(height) - 0.5, 0, height - 1)
-    left, top = x.astype(np.intp), y.astype(np.intp)
-    right, bottom = np.minimum(left + 1, width - 1), np.minimum(top + 1, height - 1)
-    fx, fy = (x - left).astype(np.float32)[:, None], (y - top).astype(np.float32)[:, None]
+    left, right, top, bottom, *shares = texels_around(st, texture.shape[1], texture.shape[0])
+    fx, fy = (share.astype(np.float32)[:, None] for share in shares)
     upper = (1 - fx) * texture[top, left] + fx * texture[top, right]
     lower = (1 - fx) * texture[bottom, left] + fx * texture[bottom, right]
     return np.asarray(((1 - fy) * upper + fy * lower) / np.float32(255), np.float32)

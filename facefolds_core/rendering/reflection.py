@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.reflections import ReflectionMaps, reflected, sphere_position
 from facefolds_core.geometry.sphere_uv import Window, st_to_uv, uv_to_st
-from facefolds_core.rendering.reference import Hits
+from facefolds_core.rendering.reference import Hits, texels_around
 
 Array = NDArray[np.float32]
 
@@ -48,25 +48,7 @@ def reflected_colours(
 
 def look_up(table: Array, st: NDArray[np.float64]) -> Array:
     """(h, w, C) at (M, 2), bilinear, clamped -> (M, C)."""
-    texels, weights = bilinear(np.asarray(st, np.float32), (table.shape[0], table.shape[1]))
-    return np.asarray(np.einsum("mt,mtc->mc", weights, table.reshape(-1, table.shape[-1])[texels]), np.float32)
-
-
-def bilinear(st: Array, size: tuple[int, int]) -> tuple[NDArray[np.intp], Array]:
-    """The four texels (flat indices) and weights of clamped bilinear look-ups in a map of (height, width).
-
-    Args:
-        st: (M, 2).
-
-    Returns:
-        (M, 4) indices into the flattened map, (M, 4) weights that add up to 1.
-    """
-    height, width = size
-    x = np.clip(st[:, 0] * np.float64(width) - 0.5, 0, width - 1)
-    y = np.clip(st[:, 1] * np.float64(height) - 0.5, 0, height - 1)
-    left, top = x.astype(np.intp), y.astype(np.intp)
-    right, bottom = np.minimum(left + 1, width - 1), np.minimum(top + 1, height - 1)
-    fx, fy = x - left, y - top
-    texels = [top * width + left, top * width + right, bottom * width + left, bottom * width + right]
-    weights = [(1 - fy) * (1 - fx), (1 - fy) * fx, fy * (1 - fx), fy * fx]
-    return np.stack(texels, -1), np.stack(weights, -1).astype(np.float32)
+    left, right, top, bottom, fx, fy = texels_around(np.asarray(st, np.float32), table.shape[1], table.shape[0])
+    texels = np.stack([table[top, left], table[top, right], table[bottom, left], table[bottom, right]], 1)
+    weights = np.stack([(1 - fy) * (1 - fx), (1 - fy) * fx, fy * (1 - fx), fy * fx], -1).astype(np.float32)
+    return np.asarray(np.einsum("mt,mtc->mc", weights, texels), np.float32)

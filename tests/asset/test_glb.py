@@ -19,6 +19,9 @@ from facefolds_core.params import CompressParams, MeshCodec
 from tests.assets import CENTRE, make_asset
 from tests.gltf_files import complaints, opened, part, validator_report
 
+Opened = tuple[dict[str, Any], bytes]
+"""A document and its binary chunk."""
+
 
 @pytest.fixture(scope="module")
 def asset(tmp_path_factory: pytest.TempPathFactory) -> Asset:
@@ -26,6 +29,13 @@ def asset(tmp_path_factory: pytest.TempPathFactory) -> Asset:
     mesh = MeshCodec(quantization_bits=14, compression_level=7)
     make_asset(folder, layers=3, frames=3, params=CompressParams(mesh=mesh))
     return read_asset(folder)
+
+
+@pytest.fixture(scope="module")
+def written(asset: Asset) -> Opened:
+    """Its first frame."""
+    write_glb(asset.folder.with_suffix(".glb"), asset.full, "caps")
+    return opened(asset.folder.with_suffix(".glb"))
 
 
 def test_each_layer_shows_its_texture(asset: Asset, tmp_path: Path) -> None:
@@ -48,9 +58,8 @@ def test_each_layer_shows_its_texture(asset: Asset, tmp_path: Path) -> None:
         np.testing.assert_array_equal(pixels[y - 1, x : x + texture.shape[1]], found[0])  # the gutter repeats it
 
 
-def test_places_on_the_chart_are_those_of_the_directions(asset: Asset, tmp_path: Path) -> None:
-    write_glb(tmp_path / "a.glb", asset.full, "caps")
-    document, binary = opened(tmp_path / "a.glb")
+def test_places_on_the_chart_are_those_of_the_directions(written: Opened) -> None:
+    document, binary = written
     chart = values(document, binary, "TEXCOORD_1", 2).astype(np.float64)
     uv = np.stack([2 - 4 * chart[:, 1], 4 * chart[:, 0] - 2], -1)
     towards = values(document, binary, "POSITION", 3) - np.array(CENTRE)
@@ -69,9 +78,8 @@ def faces_of(document: dict[str, Any], binary: bytes, primitive: int) -> np.ndar
     return np.frombuffer(part(document, binary, accessor["bufferView"]), "<u4").reshape(-1, 3)
 
 
-def test_the_subject_looks_to_z_with_y_up(asset: Asset, tmp_path: Path) -> None:
-    write_glb(tmp_path / "a.glb", asset.full, "caps")
-    document, _ = opened(tmp_path / "a.glb")
+def test_the_subject_looks_to_z_with_y_up(written: Opened) -> None:
+    document, _ = written
     x, y, z, w = document["nodes"][document["scenes"][0]["nodes"][0]]["rotation"]
     axis = np.array([x, y, z])
     turned = [v + 2 * w * np.cross(axis, v) + 2 * np.cross(axis, np.cross(axis, v)) for v in np.eye(3)]
@@ -83,9 +91,8 @@ def test_a_frame_that_is_not_there(asset: Asset, tmp_path: Path) -> None:
         write_glb(tmp_path / "a.glb", asset.full, "caps", frame=3)
 
 
-def test_the_shell_comes_from_within_and_from_the_back_without_backs(asset: Asset, tmp_path: Path) -> None:
-    write_glb(tmp_path / "a.glb", asset.full, "caps")
-    document, binary = opened(tmp_path / "a.glb")
+def test_the_shell_comes_from_within_and_from_the_back_without_backs(asset: Asset, written: Opened) -> None:
+    document, binary = written
     assert [material["alphaMode"] for material in document["materials"]] == ["MASK", "BLEND"]
     assert not any(material["doubleSided"] for material in document["materials"])
     faces = faces_of(document, binary, 1)
@@ -103,9 +110,8 @@ def test_the_shell_comes_from_within_and_from_the_back_without_backs(asset: Asse
     assert len(faces) == 0
 
 
-def test_the_core_has_the_triangles_with_opaque_texels(asset: Asset, tmp_path: Path) -> None:
-    write_glb(tmp_path / "a.glb", asset.full, "caps")
-    document, binary = opened(tmp_path / "a.glb")
+def test_the_core_has_the_triangles_with_opaque_texels(asset: Asset, written: Opened) -> None:
+    document, binary = written
     core = {tuple(face) for face in faces_of(document, binary, 0)}
     assert 0 < len(core) < sum(len(layer.faces) for layer in asset.layers)
     textures = opaque_where_covered(asset.frame(0), asset.windows)
@@ -131,8 +137,7 @@ def test_windows_are_minded_where_layers_are_compared() -> None:
     assert changed[0, :, 3].tolist() == [255, 100]
 
 
-def test_khronos_validator(asset: Asset, tmp_path: Path) -> None:
-    write_glb(tmp_path / "a.glb", asset.full, "caps")
-    report = validator_report(tmp_path / "a.glb")
+def test_khronos_validator(asset: Asset, written: Opened) -> None:
+    report = validator_report(asset.folder.with_suffix(".glb"))
     assert complaints(report) == []
     assert report["info"]["drawCallCount"] == 2

@@ -4,23 +4,20 @@ from __future__ import annotations
 
 import itertools
 import json
-import shutil
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from PIL import Image
 
-from facefolds_core.asset import Asset, read_asset
+from facefolds_core.asset import Asset
 from facefolds_core.engines.godot import CONTENTS, export
-from facefolds_core.geometry.torso import Torso
 from facefolds_core.rendering.reference import render_asset
 from tests.assets import make_asset
 from tests.engines.godot import errors, missing, pictures, run_godot, view_of
-from tests.engines.tracks import with_track
+from tests.engines.tracks import over_torso, with_track
 from tests.pictures import GREY_VALUE, expected_pictures, five_cameras, lit_picture, psnr
-from tests.viewer.fixtures import add_reflection
+from tests.viewer.fixtures import shining
 
 pytestmark = pytest.mark.slow
 
@@ -71,9 +68,7 @@ def test_a_picture_holds_colour_and_alpha_of_its_frame(caps: Asset, exported: Pa
 
 @pytest.mark.usefixtures("_godot")
 def test_reflections_agree_with_the_reference(caps: Asset, tmp_path: Path) -> None:
-    shutil.copytree(caps.folder, tmp_path / "asset")
-    add_reflection(tmp_path / "asset")
-    level, cameras = read_asset(tmp_path / "asset").full, five_cameras(SIZE)[:2]
+    level, cameras = shining(caps, tmp_path / "asset").full, five_cameras(SIZE)[:2]
     export(tmp_path / "godot", level, "caps")
     found = pictures(tmp_path / "godot", cameras, (2,), GREY_VALUE)
     plain = expected_pictures(caps, cameras, (2,))
@@ -85,9 +80,7 @@ def test_reflections_agree_with_the_reference(caps: Asset, tmp_path: Path) -> No
 
 @pytest.mark.usefixtures("_godot")
 def test_a_head_that_moves_stands_where_it_stood_and_the_light_stays(caps: Asset, tmp_path: Path) -> None:
-    shutil.copytree(caps.folder, tmp_path / "asset")
-    add_reflection(tmp_path / "asset")
-    level, camera, frame = with_track(read_asset(tmp_path / "asset").full, 40), five_cameras(SIZE)[1], 4
+    level, camera, frame = with_track(shining(caps, tmp_path / "asset").full, 40), five_cameras(SIZE)[1], 4
     export(tmp_path / "godot", level, "caps")
     found = pictures(tmp_path / "godot", [camera], (frame,), GREY_VALUE)[camera.name, frame]
     assert psnr(found, lit_picture(level, camera, frame)) >= AGREE
@@ -96,9 +89,7 @@ def test_a_head_that_moves_stands_where_it_stood_and_the_light_stays(caps: Asset
 @pytest.mark.usefixtures("_godot")
 def test_a_torso_stays_in_the_room(caps: Asset, tmp_path: Path) -> None:
     level, camera, frame = with_track(caps.full, 40), five_cameras(SIZE)[1], 4
-    assert level.track is not None
-    torso = Torso.at([0.0, 0.0, -1.0], -0.05, 0.1, level.track.at(0))
-    over = replace(level, track=replace(level.track, torso=torso))
+    over = over_torso(level)
     export(tmp_path / "godot", over, "caps")
     found = pictures(tmp_path / "godot", [camera], (frame,), GREY_VALUE)[camera.name, frame]
     expected = [render_asset(one, camera, frame, (GREY_VALUE,) * 3)[0] for one in (over, level)]

@@ -190,12 +190,12 @@ def test_coarser_levels_are_never_finer_than_the_full_one(
     for name, value in {"MESHES": (8, 16), "LOSS": 50.0, "FIDELITY": 0.0}.items():
         monkeypatch.setattr(choosing, name, value)
     monkeypatch.setattr(steps, "MESHES", (8, 16))
-    made = steps.decimate_all(
+    meshes, coarser, why = steps.decimate_all(
         surfaces(grids, method), grids, scene, tmp_path / "samples.arrow", DecimateParams(), [6, 12]
     )
-    assert made.why is not None and made.why.values["chosen"] == 8
-    assert len(made.meshes[0].vertices) <= 64
-    assert made.coarser[12] is made.meshes and len(made.coarser[6][0].vertices) <= 36
+    assert why is not None and why.values["chosen"] == 8
+    assert len(meshes[0].vertices) <= 64
+    assert coarser[12] is meshes and len(coarser[6][0].vertices) <= 36
 
 
 def test_what_was_chosen_is_said_and_kept(tmp_path: Path) -> None:

@@ -88,25 +88,6 @@ def test_layers_never_cross_and_faces_never_turn_over(sheets: Sheets, seed: int)
         assert covered_area(mesh) == pytest.approx((1 - 1 / N) ** 2, rel=1e-5)
 
 
-def test_between_the_vertices_a_layer_stays_below_the_one_around_it() -> None:
-    # 1 / t = sum a_k / rho_k: along any direction in a triangle's cone, closed form against the planes themselves.
-    rng = np.random.default_rng(0)
-    for _ in range(50):
-        corners = rng.normal(size=(3, 3)) * 0.3 + [1, 0, 0]
-        corners /= np.linalg.norm(corners, axis=-1, keepdims=True)
-        outer = rng.uniform(0.2, 0.4, 3)
-        inner = outer * rng.uniform(0.3, 1, 3)
-        share = rng.uniform(0, 1, 3)
-        direction = share @ corners
-        distances = []
-        for radii in (outer, inner):
-            vertices = corners * radii[:, None]
-            normal = np.cross(vertices[1] - vertices[0], vertices[2] - vertices[0])
-            distances.append((normal @ vertices[0]) / (normal @ direction))
-            assert 1 / distances[-1] == pytest.approx((share / radii).sum())
-        assert distances[1] <= distances[0] + 1e-12
-
-
 def test_vertices_gather_where_the_radius_jumps(sheets: Sheets) -> None:
     radii = np.full_like(sheets.radii, 0.3)
     radii[1] = 0.29

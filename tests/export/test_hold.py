@@ -116,7 +116,7 @@ def test_what_shows_moves_and_what_does_not_stays(memory: int, tmp_path: Path, m
     weights = texel_weights(codes, store, 1)
     found = np.empty_like(textures)
     monkeypatch.setattr("facefolds_core.export.hold.MEMORY", memory)
-    for layer, frame, image in held_rows(store, weights, 1.0, tmp_path):
+    for layer, frame, image in held_rows(store, weights, 1.0, tmp_path, KeptFrames(None)):
         found[layer, frame] = image
     assert [p.name for p in tmp_path.iterdir()] == ["textures.arrow"]
     assert (found[0] == textures[0]).mean() > 0.99
@@ -135,17 +135,15 @@ def test_each_frame_is_held_once_among_those_around_it(count: int, window: int) 
         assert around.stop == min(count, own.stop + margin)
 
 
-def held(
-    images: np.ndarray, folder: Path, window: int, kept: KeptFrames | None = None, weight: float = 0.2
-) -> np.ndarray:
+def held(images: np.ndarray, folder: Path, window: int, keep: Path | None = None, weight: float = 0.2) -> np.ndarray:
     """One layer of images (K, 8, 8, 4)."""
     write_frames(folder / "t.arrow", (8, 8, 4), ((0, k, one) for k, one in enumerate(images)))
     weights, store = np.full((1, 8, 8, 2), weight, np.float32), FrameStore(folder / "t.arrow")
+    kept = KeptFrames(keep)
     with patch("facefolds_core.export.hold.WINDOW", window):
         rows = list(held_rows(store, weights, 1.0, folder, kept))
-    if kept is not None:
-        write_frames(folder / "held.arrow", (8, 8, 4), rows, packed=True)
-        kept.keep(folder / "held.arrow")
+    write_frames(folder / "held.arrow", (8, 8, 4), rows, packed=True)
+    kept.keep(folder / "held.arrow")
     return np.stack([image for _, _, image in rows])
 
 
@@ -181,7 +179,7 @@ def test_parts_that_would_be_the_same_are_taken_over(tmp_path: Path, monkeypatch
 
     def runs(shown: np.ndarray, weight: float = 0.2) -> int:
         made.clear()
-        found = held(shown, tmp_path, 16, KeptFrames(tmp_path / "kept"), weight)
+        found = held(shown, tmp_path, 16, tmp_path / "kept", weight)
         count = len(made)
         assert np.array_equal(found, held(shown, tmp_path, 16, weight=weight))
         return count

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import shutil
 from dataclasses import replace
 from fractions import Fraction
 from itertools import pairwise
@@ -16,12 +15,11 @@ from click.testing import Result
 from PIL import Image
 from typer.testing import CliRunner
 
-from facefolds_core.asset import Asset, read_asset
+from facefolds_core.asset import Asset
 from facefolds_core.asset.manifest_extras import FilmedView
 from facefolds_core.cli import app
 from facefolds_core.cli.render import Kind, film_path, film_rate, parse_colour, parse_size, shrink
 from facefolds_core.errors import UserError
-from facefolds_core.geometry.torso import Torso
 from facefolds_core.rendering.camera_paths import Eye, camera_of, distance_to_fit, fly_through, frame_due, turntable
 from facefolds_core.rendering.opengl import OpenGLRenderer
 from facefolds_core.rendering.pixels import render
@@ -29,10 +27,10 @@ from facefolds_core.rendering.reference import AssetCaster, composite, render_as
 from facefolds_core.rendering.reflection import reflected_colours
 from tests.asset.test_audio import tone
 from tests.assets import SOURCE, make_asset
-from tests.engines.tracks import with_track
+from tests.engines.tracks import over_torso, with_track
 from tests.pictures import psnr
 from tests.scenes import look_at_origin, view_of
-from tests.viewer.fixtures import add_reflection, change_manifest, file_entry, random_reflection
+from tests.viewer.fixtures import change_manifest, file_entry, random_reflection, shining
 
 
 @pytest.fixture(scope="module")
@@ -83,9 +81,7 @@ def test_the_light_stays_with_the_room_where_the_head_turns(caps: Asset) -> None
 
 def test_a_torso_stays_in_the_room(caps: Asset) -> None:
     level, camera = with_track(caps.full, 30), look_at_origin("camera", 30, 10, 120)
-    assert level.track is not None
-    torso = Torso.at([0.0, 0.0, -1.0], -0.05, 0.1, level.track.at(0))
-    over = replace(level, track=replace(level.track, torso=torso))
+    over = over_torso(level)
     expected, whole = (render_asset(one, camera, 2)[0] for one in (over, level))
     with OpenGLRenderer(over) as renderer:
         rgb, _ = renderer.render(camera, 2)
@@ -228,16 +224,14 @@ def test_a_still(caps: Asset, tmp_path: Path) -> None:
 
 def test_by_default_a_still_shows_means_over_pixels(caps: Asset, tmp_path: Path) -> None:
     """With the reflection, as the library's own `render`."""
-    folder = tmp_path / "asset"
-    shutil.copytree(caps.folder, folder)
-    add_reflection(folder)
+    asset = shining(caps, tmp_path / "asset")
     camera = look_at_origin("camera", 35, 10, 64)
     (tmp_path / "camera.json").write_text(json.dumps(view_of(camera)))
     look = ["--camera", tmp_path / "camera.json", "--frame", "1", "--background", "#336699"]
-    done = run(folder, "--out", tmp_path / "still.png", *look)
+    done = run(asset.folder, "--out", tmp_path / "still.png", *look)
     assert done.exit_code == 0, done.output
     shown = np.asarray(Image.open(tmp_path / "still.png")) / 255
-    expected = render(read_asset(folder), camera, 1, (0.2, 0.4, 0.6))[0]
+    expected = render(asset, camera, 1, (0.2, 0.4, 0.6))[0]
     assert psnr(shown, expected) > 55  # seen: 62.7
 
 

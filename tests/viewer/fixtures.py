@@ -102,6 +102,13 @@ def add_reflection(folder: Path) -> None:
     change_manifest(folder, lambda value: value["levels"][-1].update(reflection=entry))
 
 
+def shining(asset: Asset, folder: Path) -> Asset:
+    """A copy of an asset with `random_reflection`."""
+    shutil.copytree(asset.folder, folder)
+    add_reflection(folder)
+    return read_asset(folder)
+
+
 def moving_asset(folder: Path, source: AssetSource = MOVING, **options: Any) -> Asset:
     """Three frames of a head that moves in the light of its room; over a torso it is all that the extension of glTF
     says."""

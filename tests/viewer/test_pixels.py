@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import shutil
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 from PIL import Image
 
-from facefolds_core.asset import Asset, read_asset
+from facefolds_core.asset import Asset
 from facefolds_core.asset.writer import AssetSource
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.rendering.areas import AreaView
@@ -21,7 +20,7 @@ from facefolds_core.rendering.reference import seen_from
 from tests.assets import MOVING, OVER_TORSO, make_asset
 from tests.pictures import GREY, GREY_VALUE, expected_means, expected_pictures, five_cameras, psnr
 from tests.viewer.conftest import NO_WEBCODECS, NewPlayer
-from tests.viewer.fixtures import add_reflection, moving_asset
+from tests.viewer.fixtures import moving_asset, shining
 
 SIZE = 160
 AGREE = 53.0
@@ -107,11 +106,8 @@ def test_a_transparent_background_stays_transparent(new_player: NewPlayer, caps:
 
 
 def test_reflections_follow_the_format(new_player: NewPlayer, caps: Asset, tmp_path: Path) -> None:
-    folder = tmp_path / "asset"
-    shutil.copytree(caps.folder, folder)
-    add_reflection(folder)
-    asset = read_asset(folder)
-    player = new_player({"asset": folder})
+    asset = shining(caps, tmp_path / "asset")
+    player = new_player({"asset": asset.folder})
     player.open("asset")
     player.run("e.background = v", GREY)
     camera = five_cameras(SIZE)[1]

@@ -16,18 +16,18 @@ import numpy as np
 from pydantic import Field, ValidationError
 
 from facefolds_core.asset.audio import sound_problem
-from facefolds_core.asset.checks import FARTHEST, FPS_RANGE, MOST_FRAMES
+from facefolds_core.asset.checks import FPS_RANGE, MOST_FRAMES
 from facefolds_core.asset.draco import DracoError, decode_mesh
 from facefolds_core.asset.gltf.document import Glb, GlbError, Loose, Primitive, in_words, validated
 from facefolds_core.asset.gltf.extension import DRACO, NAME, TEXTURE_VIDEO, Index, LayeredVideo, Reflection
+from facefolds_core.asset.manifest_base import FARTHEST
 from facefolds_core.asset.packing import AtlasLayout, inside
-from facefolds_core.asset.video import decode_video, probe_video
+from facefolds_core.asset.video import BT709_LIMITED, decode_video, probe_video
 from facefolds_core.errors import UserError
 from facefolds_core.files.pictures import DamagedPictureError, open_picture
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.geometry.track import UNIT
 
-BT709_LIMITED = (1, 1)
 EDGE = 1e-6
 """How far beyond [0, 1] texture coordinates may be."""
 LENGTH = 1e-4

@@ -12,7 +12,6 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-import av
 import numpy as np
 from numpy.typing import NDArray
 
@@ -49,6 +48,7 @@ from facefolds_core.asset.opaque import opaque_where_covered
 from facefolds_core.asset.reader import AssetLevel, layer_bytes
 from facefolds_core.asset.stored import read_slice
 from facefolds_core.asset.streams import copy_packets
+from facefolds_core.asset.video import written
 from facefolds_core.geometry.reflections import window_to_window
 from facefolds_core.geometry.track import Track
 
@@ -56,8 +56,8 @@ UNSIGNED_SHORT = 5123
 PLAYS_ANYWHERE = "h264"
 STILL, LAYERS = 0, 1
 """Indices of the meshes."""
-STILL_IMAGE, VIDEO, MAPS = 0, 1, 2
-"""Indices of the textures."""
+VIDEO, MAPS = 1, 2
+"""Indices of the textures; the still's is 0."""
 
 
 def write_layered(
@@ -146,7 +146,7 @@ def _with_sound(level: AssetLevel, video: Video, sound: Audio) -> bytes:
         if sound.mime != AAC_MIME:
             encode_sound(encoded, heard, texture.frames / texture.fps)
             heard = encoded
-        with av.open(str(joined), "w", format="mp4", options={"fflags": "bitexact", "movflags": "faststart"}) as made:
+        with written(joined, "mp4") as made:
             copy_packets(made, [level.folder / video.file, heard], texture.rate)
         return joined.read_bytes()
 
