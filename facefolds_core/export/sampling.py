@@ -6,7 +6,7 @@ Only the model's own interface is used, so that any model can be exported.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -144,41 +144,35 @@ def texture_rows(model: RadianceManifolds, grids: Grids) -> Iterator[tuple[int, 
     Raises:
         UserError: if the model gives a colour or an alpha that is not finite.
     """
-    sheets = [_Sheet(model, n, grids.window(n), grids.valid[n]) for n in range(grids.num_layers)]
+    images = [_images(model, n, grids.window(n), grids.valid[n]) for n in range(grids.num_layers)]
     for frame in progress(range(model.num_frames), desc="textures", unit="frame"):
-        for layer, sheet in enumerate(sheets):
-            yield layer, frame, sheet.image(frame)
+        for layer, image in enumerate(images):
+            yield layer, frame, image(frame)
 
 
-class _Sheet:
-    """The texels of one layer, which show what it has in its window.
-
-    Args:
-        model: of the layer.
-        layer: index.
-        window, valid: of the layer's grid.
-    """
-
-    def __init__(self, model: RadianceManifolds, layer: int, window: Window, valid: NDArray[np.bool_]) -> None:
-        self._model, self._layer, self._valid = model, layer, valid
-        self._grid = grid = model.texel_grid()
-        if grid is None:
-            self._uv = texel_uv(len(valid), len(valid), window)[valid]
-            return
-        self._uv = texel_uv(grid.shape[0], grid.shape[1], grid.window).reshape(-1, 2)
+def _images(
+    model: RadianceManifolds, layer: int, window: Window, valid: NDArray[np.bool_]
+) -> Callable[[int], NDArray[np.uint8]]:
+    """A function of the frame: (R, R, 4) RGBA of a layer in its window; of a model with texels, those that interpolate
+    to what it shows; of others, its values."""
+    grid, size = model.texel_grid(), len(valid)
+    if grid is None:
+        places = texel_uv(size, size, window)[valid]
+    else:
+        places = texel_uv(grid.shape[0], grid.shape[1], grid.window).reshape(-1, 2)
         corners = np.array([[window[1], window[2]], [window[0], window[3]]])
         (left, top), (right, bottom) = np.asarray(uv_to_st(corners, grid.window)).tolist()
-        self._projection = Projection(grid.shape, (len(valid), len(valid)), (top, bottom, left, right))
+        projection = Projection(grid.shape, (size, size), (top, bottom, left, right))
 
-    def image(self, frame: int) -> NDArray[np.uint8]:
-        """(R, R, 4) RGBA: of a model with texels, those that interpolate to what it shows; of others, its values."""
-        uv = torch.as_tensor(self._uv).to(self._model.centre.detach())
-        values = _texels(self._model, uv, self._layer, frame)
-        if self._grid is not None:
-            values = self._projection(values.reshape(*self._grid.shape, 4))[self._valid]
-        image = np.zeros((*self._valid.shape, 4), np.uint8)
-        image[self._valid] = np.rint(values * np.float32(255))
-        return image
+    def image(frame: int) -> NDArray[np.uint8]:
+        values = _texels(model, torch.as_tensor(places).to(model.centre.detach()), layer, frame)
+        if grid is not None:
+            values = projection(values.reshape(*grid.shape, 4))[valid]
+        found = np.zeros((*valid.shape, 4), np.uint8)
+        found[valid] = np.rint(values * np.float32(255))
+        return found
+
+    return image
 
 
 @torch.no_grad()

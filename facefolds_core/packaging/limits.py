@@ -7,7 +7,7 @@ tell: there is one from where each camera stood only, and there the asset was ma
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
 from itertools import combinations_with_replacement
 
 import numpy as np
@@ -17,10 +17,9 @@ from scipy.ndimage import median_filter, uniform_filter
 from facefolds_core.asset.filmed import FREE
 from facefolds_core.asset.manifest_extras import Directions, FilmedView
 from facefolds_core.asset.reader import AssetLevel
-from facefolds_core.geometry.track import Track
 from facefolds_core.rendering.camera_paths import Eye, camera_of
 from facefolds_core.rendering.raster import cast_layers
-from facefolds_core.rendering.reference import Layered, composite, layers_in, seen_from
+from facefolds_core.rendering.reference import composite, layers_in, seen_from
 from facefolds_core.spacing import spread
 
 SIDE = 200
@@ -43,34 +42,20 @@ PATCH_SHARE, LEAST_PATCH, COVERED = 1 / 8, 8, 0.3
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class Model:
-    """Layers of which one looks at some frames.
+def veil_from(level: AssetLevel) -> Callable[[float, float], float]:
+    """A function of azimuth and elevation, degrees: `worst_veil` from there, of the frame that is worst."""
+    corners = np.concatenate([layer.vertices for layer in level.layers]).astype(np.float64)
+    low, high = corners.min(0), corners.max(0)
+    centre, radius = (low + high) / 2, float(np.linalg.norm(high - low)) / 2
+    poses = {k: level.frame(k) for k in spread(range(level.num_frames), POSES if level.track else 1)}
 
-    Attributes:
-        low, high: corners of the box around them, units.
-        poses: frame -> N textures.
-    """
-
-    level: Layered
-    low: Array
-    high: Array
-    poses: dict[int, list[NDArray[np.uint8]]]
-
-    @classmethod
-    def of(cls, level: AssetLevel) -> Model:
-        corners = np.concatenate([layer.vertices for layer in level.layers]).astype(np.float64)
-        track: Track | None = level.track
-        frames = spread(range(level.num_frames), POSES if track else 1)
-        return cls(level, corners.min(0), corners.max(0), {k: list(level.frame(k)) for k in frames})
-
-    def worst(self, azimuth: float, elevation: float) -> float:
-        """`worst_veil` from that direction, degrees; of the frame that is worst."""
-        centre, radius = (self.low + self.high) / 2, float(np.linalg.norm(self.high - self.low)) / 2
+    def worst(azimuth: float, elevation: float) -> float:
         eye = Eye(azimuth, elevation, AWAY * radius, tuple(centre.tolist()))
         camera = camera_of(eye, SIDE, SIDE, FIELD_OF_VIEW)
-        hits = {k: cast_layers(seen_from(self.level, camera, k), layers_in(self.level, k)) for k in self.poses}
-        return max(worst_veil(composite(hits[k], textures)[1]) for k, textures in self.poses.items())
+        hits = {k: cast_layers(seen_from(level, camera, k), layers_in(level, k)) for k in poses}
+        return max(worst_veil(composite(hits[k], textures)[1]) for k, textures in poses.items())
+
+    return worst
 
 
 def worst_veil(alpha: NDArray[np.floating]) -> float:
@@ -88,7 +73,7 @@ def worst_veil(alpha: NDArray[np.floating]) -> float:
     return float(np.where(cover >= COVERED, veil, 0).max())
 
 
-def good_view(model: Model, filmed: FilmedView) -> Directions | None:
+def good_view(level: AssetLevel, filmed: FilmedView) -> Directions | None:
     """The largest range of directions around the front from all of which the picture is good.
 
     Args:
@@ -98,7 +83,8 @@ def good_view(model: Model, filmed: FilmedView) -> Directions | None:
         None where not even the front is better than the rest.
     """
     azimuths, elevations = (directions(*limits) for limits in (filmed.azimuth, filmed.elevation))
-    found = np.array([[model.worst(a, e) for a in azimuths] for e in elevations])
+    worst = veil_from(level)
+    found = np.array([[worst(a, e) for a in azimuths] for e in elevations])
     smooth = median_filter(found, 3, mode="nearest")  # one direction decides nothing
     typical = float(np.median(smooth[np.ix_(middle_half(elevations), middle_half(azimuths))]))
     start = nearest_to_front(elevations), nearest_to_front(azimuths)

@@ -33,7 +33,7 @@ from facefolds_core.geometry.reflections import ReflectionMaps
 from facefolds_core.geometry.sphere_uv import Window
 from facefolds_core.packaging.coding import coded_level, make_meter
 from facefolds_core.packaging.levels import coarse_content, is_streamed, stream_unit, write_rungs
-from facefolds_core.packaging.limits import Model, good_view
+from facefolds_core.packaging.limits import good_view
 from facefolds_core.packaging.poster import BACKGROUND, JPEG_QUALITY, write_poster
 from facefolds_core.packaging.settings import level_params
 from facefolds_core.params import CompressParams, LevelParams
@@ -132,7 +132,7 @@ def _with_extras(folder: Path, manifest: Manifest, scene: Scene, photos: Sequenc
         unseen = [scene.cameras[index] for index in scene.indices("holdout")]
         view = filmed_view([scene.cameras[index] for index in train], unseen)
         if view is not None:
-            view = view.model_copy(update={"good": good_view(Model.of(level), view)})
+            view = view.model_copy(update={"good": good_view(level, view)})
         update["view"] = view
     path, first = folder / "poster.jpg", scene.cameras[0]
     side = min(POSTER_SIDE, max(first.width, first.height))

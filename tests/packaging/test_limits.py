@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 
 from facefolds_core.asset.filmed import FREE
 from facefolds_core.asset.manifest_extras import FilmedView
-from facefolds_core.geometry.meshes import TexturedMesh
-from facefolds_core.packaging.limits import STEP, Model, directions, good_view, largest_range, worst_veil
+from facefolds_core.packaging.limits import STEP, directions, good_view, largest_range, worst_veil
 from tests.assets import cap_mesh
 
 FILMED = FilmedView(azimuth=(-40, 40), elevation=(-12, 12))
@@ -19,22 +21,11 @@ TORN = 212
 """First column of texels that are torn: 75 degrees to the left, hardly seen from before."""
 
 
-class Cap:
+def cap(alpha: np.ndarray) -> Any:
     """One layer, opaque but for a part."""
-
-    def __init__(self, alpha: np.ndarray) -> None:
-        self.layers: list[TexturedMesh] = [cap_mesh(0.4, 40, WINDOW)]
-        self.texture = np.full((*SHAPE, 4), 200, np.uint8)
-        self.texture[..., 3] = alpha
-
-    def frame(self, k: int, /) -> list[np.ndarray]:
-        return [self.texture]
-
-
-def looked_at(alpha: np.ndarray) -> Model:
-    cap = Cap(alpha)
-    corners = cap.layers[0].vertices.astype(np.float64)
-    return Model(cap, corners.min(0), corners.max(0), {0: cap.frame(0)})
+    texture = np.full((*SHAPE, 4), 200, np.uint8)
+    texture[..., 3] = alpha
+    return SimpleNamespace(layers=[cap_mesh(0.4, 40, WINDOW)], track=None, num_frames=1, frame=lambda k: [texture])
 
 
 def test_a_veil_counts_where_it_is_thickest() -> None:
@@ -63,7 +54,7 @@ def test_the_largest_range_holds_the_front() -> None:
 
 
 def test_a_whole_cap_is_good_from_everywhere() -> None:
-    found = good_view(looked_at(np.full(SHAPE, 255)), FILMED)
+    found = good_view(cap(np.full(SHAPE, 255)), FILMED)
     assert found is not None
     assert (found.azimuth, found.elevation) == ((-40 - FREE, 40 + FREE), (-12 - FREE, 12 + FREE))
 
@@ -71,7 +62,7 @@ def test_a_whole_cap_is_good_from_everywhere() -> None:
 def test_a_torn_side_bounds_that_side() -> None:
     alpha = np.full(SHAPE, 255)
     alpha[:, TORN:] = np.random.default_rng(0).choice([0, 90, 255], (SHAPE[0], SHAPE[1] - TORN))
-    found = good_view(looked_at(alpha), FILMED)
+    found = good_view(cap(alpha), FILMED)
     assert found is not None
     right, left = found.azimuth
     assert right == -40 - FREE and 0 < left < FILMED.azimuth[1]
