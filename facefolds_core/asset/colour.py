@@ -52,8 +52,7 @@ def yuv420_to_rgb(y: Plane, cb: Plane, cr: Plane) -> NDArray[np.uint8]:
 
 def alpha_to_luma(alpha: NDArray[np.uint8]) -> Plane:
     """Alpha 0..255 -> luma code 16..235. 256 values into 220: what comes back is at most 1 off."""
-    luma: Plane = np.rint(16 + alpha.astype(np.float32) * (219 / 255)).astype(np.uint8)
-    return luma
+    return np.asarray(np.rint(16 + alpha.astype(np.float32) * (219 / 255)), np.uint8)
 
 
 def luma_to_alpha(y: Plane) -> NDArray[np.uint8]:
@@ -62,20 +61,17 @@ def luma_to_alpha(y: Plane) -> NDArray[np.uint8]:
 
 
 def _unit_luma(y: Plane) -> Float:
-    unit: Float = (y.astype(np.float32) - np.float32(16)) / np.float32(219)
-    return unit
+    return (y.astype(np.float32) - np.float32(16)) / np.float32(219)
 
 
 def _to_byte(value: NDArray[np.floating[Any]]) -> NDArray[np.uint8]:
-    codes: Plane = np.rint(np.clip(value, 0, 1) * 255).astype(np.uint8)
-    return codes
+    return np.asarray(np.rint(np.clip(value, 0, 1) * 255), np.uint8)
 
 
 def _halve(chroma: Float) -> Plane:
     """(H, W) in [-0.5, 0.5] -> codes (H/2, W/2), within those that colours have."""
     fitted = _fitted(np.ascontiguousarray(_fitted(chroma).T)).T
-    codes: Plane = np.rint(NEUTRAL + 224 * fitted.clip(-0.5, 0.5)).astype(np.uint8)
-    return codes
+    return np.asarray(np.rint(NEUTRAL + 224 * fitted.clip(-0.5, 0.5)), np.uint8)
 
 
 def _fitted(values: Float) -> Float:

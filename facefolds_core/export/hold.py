@@ -140,9 +140,8 @@ def held_rows(
         held = _held_layer(textures, layer, around, weights[layer], price, folder)
         yield from (image for position, image in enumerate(held) if first <= position < first + len(own))
 
-    with progress(total=len(made) * len(layers), desc="hold", unit="layer") as bar:
-        groups = [[frames[k] for k in own] for own, _ in made]
-        yield from kept.groups(groups, layers, digest, make, lambda: bar.update())
+    rows = kept.groups([[frames[k] for k in own] for own, _ in made], layers, digest, make)
+    yield from progress(rows, total=len(frames) * len(layers), desc="hold", unit="texture")
 
 
 def _held_layer(

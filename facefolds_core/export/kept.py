@@ -55,7 +55,6 @@ class KeptFrames:
         layers: Sequence[int],
         digest: Callable[[Sequence[int]], str],
         make: Callable[[Sequence[int], int], Iterable[Image]],
-        done: Callable[[], object],
     ) -> Iterator[tuple[int, int, Image]]:
         """All images of frames that are made together, group by group, and in each layer by layer.
 
@@ -64,7 +63,6 @@ class KeptFrames:
             layers: N.
             digest: of what a group is made of; not asked for where nothing is kept.
             make: makes the images of a group's frames in one layer, (S, S, 4) each.
-            done: called after each layer of a group.
         """
         for frames in groups:
             names = [f"{digest(frames)} {k}" for k in range(len(frames))] if self.folder is not None else []
@@ -74,7 +72,6 @@ class KeptFrames:
                 images = self._layer(known, layer) if names and len(known) == len(names) else None
                 for frame, image in zip(frames, make(frames, layer) if images is None else images, strict=True):
                     yield layer, frame, image
-                done()
 
     def _layer(self, frames: Sequence[int], layer: int) -> Iterator[Image] | None:
         """A layer's images; None if one is missing or damaged."""

@@ -8,7 +8,6 @@ alone, then its colour where depth is equal, so that its folds count once.
 from __future__ import annotations
 
 import sys
-from types import TracebackType
 from typing import Any
 
 import moderngl
@@ -116,9 +115,7 @@ class OpenGLRenderer:
     def __enter__(self) -> OpenGLRenderer:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._context.release()
 
     @property

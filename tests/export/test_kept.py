@@ -42,7 +42,7 @@ def grouped(folder: Path, changed: int | None = None) -> tuple[list[tuple[int, i
     def digest(frames: Sequence[int]) -> str:
         return digest_of({f"{n} {k}": store.image(n, k) for n in range(LAYERS) for k in frames}).hex()
 
-    rows = kept.groups([[0, 1], [2]], range(LAYERS), digest, make, lambda: None)
+    rows = kept.groups([[0, 1], [2]], range(LAYERS), digest, make)
     write_frames(folder / "out.arrow", (8, 8, 4), rows, packed=True)
     kept.keep(folder / "out.arrow")
     out = FrameStore(folder / "out.arrow")
