@@ -122,10 +122,10 @@ def _check_table(file: BinaryIO, kind: bytes, inside: int, end: int, size: int) 
     entry = ENTRY_BYTES[kind]
     if count * entry > len(content) - 8:
         raise ContainerError(f"its table {name} claims {count} entries")
-    numbers = np.frombuffer(content, ">u4", count * entry // 4, 8).reshape(count, entry // 4).astype(np.int64)
+    numbers = np.frombuffer(content, ">u4", count * entry // 4, 8).reshape(count, entry // 4)
     total = 0
     if kind in (b"stts", b"ctts"):  # runs of pictures
-        total = int(numbers[:, 0].sum())
+        total = int(numbers[:, 0].sum(dtype=np.int64))
     elif kind == b"stsc":  # pictures of each chunk
         total = int(numbers[:, 1].max(initial=0))
     if total > size:

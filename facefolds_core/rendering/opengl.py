@@ -104,9 +104,9 @@ class OpenGLRenderer:
         self._reflections: list[tuple[str, moderngl.Texture]] = []
         self._to_maps: list[bytes] = []
         if maps is not None:
-            windows: Any = getattr(asset, "windows", ())
+            level: Any = asset
             self._reflections = self._upload_reflection(maps)
-            self._to_maps = [np.array(window_to_window(window, maps.window), "f4").tobytes() for window in windows]
+            self._to_maps = [np.array(window_to_window(one, maps.window), "f4").tobytes() for one in level.windows]
         self._vertices = np.concatenate([layer.vertices for layer in asset.layers]).astype(np.float64)
         self._frame = -1
         self._textures: list[moderngl.Texture] = []
