@@ -33,7 +33,8 @@ from facefolds_core.config.stages import read_train
 from facefolds_core.errors import UserError, report_user_errors
 from facefolds_core.model.radiance import RadianceManifolds
 from facefolds_core.params import EvaluateParams, ExplicitParams, merged
-from facefolds_core.scoring.images import Rendering, cutout_of, over_any
+from facefolds_core.scoring.backgrounds import Rendering
+from facefolds_core.scoring.images import cutout_of, over_any
 from facefolds_core.scoring.matte import interior_and_band
 from facefolds_core.scoring.metrics import decibels, shown
 from facefolds_core.scoring.model_view import ModelView

@@ -15,12 +15,12 @@ from facefolds_core.model import load_model
 from facefolds_core.model.device import device_of
 from facefolds_core.packaging.notes import codec_warning
 from facefolds_core.params import EvaluateParams
-from facefolds_core.scoring.evaluation import Evaluation
 from facefolds_core.scoring.evaluation import evaluate as score
 from facefolds_core.scoring.films import FILMS
+from facefolds_core.scoring.panels import Evaluation
 from facefolds_core.scoring.perceptual import find_perceptual
 from facefolds_core.scoring.pictures import WORST, write_training_views, write_worst
-from facefolds_core.scoring.report import Circumstances, metrics_json, read_cost, write_per_image
+from facefolds_core.scoring.report import metrics_json, read_cost, write_per_image
 from facefolds_core.scoring.sheets import write_contact_sheet
 from facefolds_core.scoring.terminal import result_lines, score_lines
 from facefolds_core.scoring.training_scores import bad_views, warnings_of
@@ -52,8 +52,7 @@ def evaluate(folders: SubjectFolders) -> str:
     with atomic_folder(folders.evaluation) as temporary:
         result = score(scene, model, asset, params, perceptual, temporary)
         warnings = noticed(folders, scene, asset, result)
-        about = Circumstances(result.matte, params.band, result.changes, result.patch, result.training, warnings)
-        metrics = metrics_json(scene.subject, result.scores, cost, about)
+        metrics = metrics_json(scene.subject, result, cost, warnings)
         write_per_image(result.scores, temporary / "per_image.parquet")
         write_contact_sheet(temporary / "contact_sheet.png", scene.subject, result.panels, metrics)
         write_worst(temporary / WORST, result.worst, result.patch)

@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import uniform_filter
 
 from facefolds_core.captures.cutout import cut_from
@@ -24,6 +24,31 @@ LEAST_PATCH = 8
 """Pixels: a smaller patch is a handful of pixels."""
 COVERED = 0.5
 """Mean opacity of a patch from which on it is taken to show the subject."""
+
+AROUND = 1.0
+"""What the crops of the worst patch show around it, in its sides."""
+GREY = 0.5
+"""Behind both crops: the same for truth and asset, so that opacity shows."""
+
+Image = NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class Rendering:
+    """A picture that lets something through.
+
+    Attributes:
+        rgb: (H, W, 3) over black.
+        alpha: (H, W).
+    """
+
+    rgb: Image
+    alpha: Image
+
+    def over(self, background: ArrayLike) -> Image:
+        """(H, W, 3) over RGB in [0, 1], (3,) or (H, W, 3)."""
+        behind: Image = (1 - self.alpha)[..., None] * np.asarray(background, np.float32)
+        return self.rgb + behind
 
 
 @dataclass(frozen=True)
@@ -101,3 +126,35 @@ def worst_patch(error: Array, opacity: Array) -> Patch | None:
     row, column = np.unravel_index(int(means.argmax()), means.shape)
     worst = float(means[row, column])
     return None if worst < 0 else Patch(decibels(worst), int(row), int(column), side)
+
+
+@dataclass(frozen=True)
+class WorstPatch:
+    """Attributes:
+    camera, frame: their names.
+    place: where in the picture, and how bad.
+    truth, asset: (h, w, 3) crops of it with its surroundings, over grey.
+    corner: (row, column) of the crops' first pixel in the picture.
+    """
+
+    camera: str
+    frame: str
+    place: Patch
+    truth: Array
+    asset: Array
+    corner: tuple[int, int]
+
+
+def find_patch(camera: str, frame: str, asset: Rendering, truth: Cutout | None) -> WorstPatch | None:
+    """The worst window of one picture; None where the subject's opacity is not known, or it is not there."""
+    if truth is None:
+        return None
+    alpha = np.clip(asset.alpha.astype(np.float64), 0, 1)
+    place = worst_patch(squared_error(asset.rgb, alpha, truth), truth.opacity)
+    if place is None:
+        return None
+    more = round(AROUND * place.side)
+    top, left = max(0, place.row - more), max(0, place.column - more)
+    crop = (slice(top, place.row + place.side + more), slice(left, place.column + place.side + more))
+    pictures = shown(truth.over(GREY)), shown(asset.over(GREY))
+    return WorstPatch(camera, frame, place, pictures[0][crop], pictures[1][crop], (top, left))

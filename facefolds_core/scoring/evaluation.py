@@ -4,8 +4,9 @@ One camera at a time, one frame at a time: memory is bounded by one camera's cro
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping
+from contextlib import nullcontext
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -16,55 +17,30 @@ from facefolds_core.errors import UserError
 from facefolds_core.model import RadianceManifolds
 from facefolds_core.params import EvaluateParams
 from facefolds_core.progress import progress
-from facefolds_core.scoring.films import FilmFile, FilmFolder
-from facefolds_core.scoring.images import Rendering, cutout_of, region_of, score_renderings
+from facefolds_core.scoring.backgrounds import Cutout, Rendering, WorstPatch, find_patch
+from facefolds_core.scoring.films import FilmFolder
+from facefolds_core.scoring.images import cutout_of, region_of, score_renderings
 from facefolds_core.scoring.metrics import Array, shown
 from facefolds_core.scoring.model_view import PosedView
-from facefolds_core.scoring.panels import ImageScore, Panel
-from facefolds_core.scoring.patches import WorstPatch, find_patch
+from facefolds_core.scoring.panels import Evaluation, ImageScore, Panel
 from facefolds_core.scoring.perceptual import Perceptual
-from facefolds_core.scoring.temporal import Change, Film, change_of
-from facefolds_core.scoring.training_scores import TrainingView
+from facefolds_core.scoring.temporal import Film, change_of
 from facefolds_core.scoring.training_views import training_views
-from facefolds_core.scoring.truths import MatteKind, Truths
+from facefolds_core.scoring.truths import Truths
 from facefolds_core.spacing import spread
 
 SCORED: tuple[Split, ...] = ("holdout", "validate")
 
 
 @dataclass(frozen=True)
-class Evaluation:
-    """What was found.
-
-    Attributes:
-        scores: all of them, held-out cameras first.
-        panels: of the contact sheet, held-out cameras alone.
-        worst: the held-out picture on which the asset's PSNR is lowest (of the subject, where that is known).
-        patch: the worst window of all held-out pictures of the asset; None where the subject's opacity is not known.
-        training: what the training cameras see of the asset.
-        matte: which opacity says where the subject is.
-        changes: split -> variant -> what it shows of what changes from frame to frame.
-        films: of the held-out cameras, where they were asked for.
-    """
-
-    scores: list[ImageScore]
-    panels: list[Panel]
-    worst: Panel
-    patch: WorstPatch | None = None
-    training: Sequence[TrainingView] = ()
-    matte: MatteKind = "true"
-    changes: Mapping[Split, Mapping[str, Change]] = field(default_factory=dict)
-    films: Sequence[FilmFile] = ()
-
-
-@dataclass(frozen=True)
 class _Shot:
-    """A scored picture, by variant, and where the asset is worst in it."""
+    """A scored picture, by variant; what the asset shows, and what it should, as far as that is known."""
 
     panel: Panel
-    patch: WorstPatch | None
     scores: list[ImageScore]
     pictures: dict[str, Array]
+    asset: Rendering
+    truth: Cutout | None
 
 
 def evaluate(
@@ -93,8 +69,8 @@ def evaluate(
             sums = []
             for index in scene.indices(split):
                 film, view = Film(), PosedView(scene, model, asset, scene.cameras[index])
-                shown_split = FilmFolder(None, 0, 0) if split == "validate" else rolls
-                with shown_split.roll(scene.cameras[index].name) as roll:
+                filming = rolls.roll(scene.cameras[index].name) if split == "holdout" else nullcontext()
+                with filming as roll:
                     for k, shot in scorer.shots(split, index, view):
                         found += shot.scores
                         if shot.panel.mask is not None:
@@ -135,10 +111,10 @@ class _Show:
         self.patch: WorstPatch | None = None
 
     def add(self, frame: int, shot: _Shot) -> None:
-        panel = shot.panel
+        panel, psnr = shot.panel, shot.panel.asset_score.values["worst_patch"]
         self.worst = panel if self.worst is None else min(self.worst, panel, key=lambda one: one.rank)
-        if shot.patch is not None and (self.patch is None or shot.patch.place.psnr < self.patch.place.psnr):
-            self.patch = shot.patch
+        if psnr is not None and (self.patch is None or psnr < self.patch.place.psnr):
+            self.patch = find_patch(panel.camera, panel.frame, shot.asset, shot.truth)
         if frame in self._on_sheet:
             self.panels.append(panel)
 
@@ -172,8 +148,7 @@ class _Scorer:
             both = pictures["model"], pictures["asset"], group["model"], group["asset"]
             over = None if truth.plate is None else shown(renderings["asset"].over(truth.plate))
             panel = Panel(camera.name, frame, truth.picture, *both, region, over)
-            patch = find_patch(camera.name, frame, renderings["asset"], cutout_of(self.kind, truth))
-            yield k, _Shot(panel, patch, list(group.values()), pictures)
+            yield k, _Shot(panel, list(group.values()), pictures, renderings["asset"], cutout_of(self.kind, truth))
 
 
 def rendered(view: PosedView, asset: Asset, frames: list[int]) -> Iterator[tuple[int, dict[str, Rendering]]]:

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 import torch
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from facefolds_core.scoring.backgrounds import Cutout, squared_error, worst_patch
+from facefolds_core.scoring.backgrounds import Cutout, Rendering, squared_error, worst_patch
 from facefolds_core.scoring.matte import Region, interior_and_band, matte_errors, opacity_errors
 from facefolds_core.scoring.metrics import Array, decibels, psnr, shown, ssim, ssim_high
 from facefolds_core.scoring.panels import ALL_METRICS, FOUND_METRICS, METRICS, SUBJECT_METRICS
@@ -21,26 +20,7 @@ MASK_EDGE = 0.1
 MASK_MARGIN = 8
 """Pixels added to that box on each side, within the frame."""
 
-Image = NDArray[np.float32]
 Values = dict[str, float | None]
-
-
-@dataclass(frozen=True)
-class Rendering:
-    """A picture that lets something through.
-
-    Attributes:
-        rgb: (H, W, 3) over black.
-        alpha: (H, W).
-    """
-
-    rgb: Image
-    alpha: Image
-
-    def over(self, background: ArrayLike) -> Image:
-        """(H, W, 3) over RGB in [0, 1], (3,) or (H, W, 3)."""
-        behind: Image = (1 - self.alpha)[..., None] * np.asarray(background, np.float32)
-        return self.rgb + behind
 
 
 def score_renderings(

@@ -1,11 +1,17 @@
-"""Scores of one picture, and the picture itself: what evaluation hands to its sheet, its tables and its record."""
+"""Scores and pictures: what evaluation hands to its sheet, its tables and its record."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 from facefolds_core.captures.scene import Split
+from facefolds_core.scoring.backgrounds import WorstPatch
+from facefolds_core.scoring.films import FilmFile
 from facefolds_core.scoring.metrics import Array
+from facefolds_core.scoring.temporal import Change
+from facefolds_core.scoring.training_scores import TrainingView
+from facefolds_core.scoring.truths import MatteKind
 
 VARIANTS = ("model", "diffuse", "asset", "asset_diffuse")
 """The trained model, and without what depends on the view; the shipped files, and without their reflection."""
@@ -82,3 +88,28 @@ class Panel:
         """Least for the worst picture of the asset: by the metric that says most, pictures that lack it last."""
         key = self.asset_score.headline
         return HEADLINES.index(key), self.asset_score.values[key] or 0.0
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """What was found.
+
+    Attributes:
+        scores: all of them, held-out cameras first.
+        panels: of the contact sheet, held-out cameras alone.
+        worst: the held-out picture on which the asset's PSNR is lowest (of the subject, where that is known).
+        patch: the worst window of all held-out pictures of the asset; None where the subject's opacity is not known.
+        training: what the training cameras see of the asset.
+        matte: which opacity says where the subject is.
+        changes: split -> variant -> what it shows of what changes from frame to frame.
+        films: of the held-out cameras, where they were asked for.
+    """
+
+    scores: list[ImageScore]
+    panels: list[Panel]
+    worst: Panel
+    patch: WorstPatch | None = None
+    training: Sequence[TrainingView] = ()
+    matte: MatteKind = "true"
+    changes: Mapping[Split, Mapping[str, Change]] = field(default_factory=dict)
+    films: Sequence[FilmFile] = ()

@@ -9,9 +9,9 @@ import cv2
 import numpy as np
 from PIL import Image
 
+from facefolds_core.scoring.backgrounds import WorstPatch
 from facefolds_core.scoring.metrics import Array
 from facefolds_core.scoring.panels import Panel
-from facefolds_core.scoring.patches import WorstPatch
 from facefolds_core.scoring.training_scores import TrainingView
 
 WORST = "worst.png"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
@@ -17,11 +16,11 @@ from facefolds_core.errors import UserError
 from facefolds_core.facts import Fact
 from facefolds_core.files.paths import SubjectFolders
 from facefolds_core.files.writing import atomic_file, read_json
-from facefolds_core.scoring.panels import ALL_METRICS, FILM_METRICS, HEADLINES, LEAST, VARIANTS, ImageScore
-from facefolds_core.scoring.patches import WorstPatch
+from facefolds_core.params import EvaluateParams
+from facefolds_core.scoring.backgrounds import WorstPatch
+from facefolds_core.scoring.panels import ALL_METRICS, FILM_METRICS, HEADLINES, LEAST, VARIANTS, Evaluation, ImageScore
 from facefolds_core.scoring.temporal import Change
 from facefolds_core.scoring.training_scores import TrainingView, bad_views, compared_by
-from facefolds_core.scoring.truths import MatteKind
 
 METRICS_VERSION = 2
 EXPORT_STAGES = ("sample", "reconstruct", "decimate", "texture", "bake", "compress")
@@ -52,46 +51,24 @@ class Training(Timing):
     device: str
 
 
-@dataclass(frozen=True)
-class Circumstances:
-    """What metrics.json says beside means and costs.
-
-    Attributes:
-        matte: which opacity says where the subject is.
-        band: pixels to both sides of the outline.
-        changes: split -> variant -> what it shows of what changes from frame to frame.
-        patch: the worst window of all held-out pictures of the asset.
-        training: what the training cameras see of it.
-        warnings: what is not well.
-    """
-
-    matte: MatteKind = "true"
-    band: float = 0.0
-    changes: Mapping[Split, Mapping[str, Change]] = field(default_factory=dict)
-    patch: WorstPatch | None = None
-    training: Sequence[TrainingView] = ()
-    warnings: Sequence[Fact] = ()
-
-
 def metrics_json(
-    subject: str, scores: Sequence[ImageScore], cost: dict[str, Any], about: Circumstances | None = None
+    subject: str, found: Evaluation, cost: dict[str, Any], warnings: Sequence[Fact] = ()
 ) -> dict[str, Any]:
     """The content of metrics.json: the held-out cameras first; those for validation apart, where there are any."""
-    about = Circumstances() if about is None else about
-    held, checked = (_means(scores, split, about) for split in ("holdout", "validate"))
+    held, checked = (_means(found, split) for split in ("holdout", "validate"))
     content: dict[str, Any] = {
         "version": METRICS_VERSION,
         "subject": subject,
         "headline": headline(held),
-        "matte": about.matte,
-        "band_pixels": about.band,
+        "matte": found.matte,
+        "band_pixels": EvaluateParams.band,
         **held,
-        "worst_patch": _patch(about.patch),
-        "training_views": _training(about.training),
+        "worst_patch": _patch(found.patch),
+        "training_views": _training(found.training),
     }
     if checked["images"]:
         content["validate"] = {"headline": headline(checked), **checked}
-    return {**content, "warnings": [one.to_json() for one in about.warnings], "cost": cost}
+    return {**content, "warnings": [one.to_json() for one in warnings], "cost": cost}
 
 
 def _patch(patch: WorstPatch | None) -> dict[str, Any] | None:
@@ -125,10 +102,10 @@ def headline(metrics: Mapping[str, Any]) -> str:
     return next((name for name in HEADLINES if isinstance(values.get(name), int | float)), HEADLINES[-1])
 
 
-def _means(scores: Sequence[ImageScore], split: Split, about: Circumstances) -> dict[str, Any]:
-    own = [score for score in scores if score.split == split]
+def _means(found: Evaluation, split: Split) -> dict[str, Any]:
+    own = [score for score in found.scores if score.split == split]
     images = [score for score in own if score.variant == VARIANTS[0]]
-    changes = about.changes.get(split, {})
+    changes = found.changes.get(split, {})
     truth = next((change.truth_change for change in changes.values()), None)
     return {
         "images": len(images),

@@ -44,18 +44,22 @@ def bad_views(views: Sequence[TrainingView]) -> list[TrainingView]:
     name = compared_by(views)
     if not views or name is None:
         return []
-    median = float(np.median([view.values[name] or 0.0 for view in views]))
-    bad = [view for view in views if (view.values[name] or 0.0) < median - BEHIND]
+    least = _median(views, name) - BEHIND
+    bad = [view for view in views if (view.values[name] or 0.0) < least]
     return sorted(bad, key=lambda view: view.values[name] or 0.0)
 
 
 def warnings_of(views: Sequence[TrainingView]) -> list[Fact]:
     """A fact for each bad view."""
-    name = compared_by(views)
-    if name is None:
+    name, bad = compared_by(views), bad_views(views)
+    if name is None or not bad:
         return []
-    median = float(np.median([view.values[name] or 0.0 for view in views])) if views else 0.0
+    median = _median(views, name)
     return [
         fact("training_view_bad", camera=view.camera, frame=view.frame, psnr=view.values[name], median=median)
-        for view in bad_views(views)
+        for view in bad
     ]
+
+
+def _median(views: Sequence[TrainingView], name: str) -> float:
+    return float(np.median([view.values[name] or 0.0 for view in views]))

@@ -9,8 +9,7 @@ from facefolds_core.captures.scene import Scene
 from facefolds_core.params import EvaluateParams
 from facefolds_core.progress import progress
 from facefolds_core.rendering.areas import view_of
-from facefolds_core.scoring.backgrounds import Cutout, squared_error
-from facefolds_core.scoring.images import Rendering
+from facefolds_core.scoring.backgrounds import Cutout, Rendering, squared_error
 from facefolds_core.scoring.matte import opacity_errors
 from facefolds_core.scoring.metrics import decibels, psnr, shown
 from facefolds_core.scoring.training_scores import TrainingView

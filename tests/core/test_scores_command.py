@@ -13,6 +13,7 @@ from typer.testing import CliRunner
 from facefolds_core.cli.scores import command
 from facefolds_core.scoring.panels import ALL_METRICS, VARIANTS, ImageScore
 from facefolds_core.scoring.report import metrics_json
+from tests.scoring.fakes import evaluation
 
 COST = {"mesh_bytes": 200_000, "texture_bytes": 300_000, "reflection_bytes": 0}
 
@@ -29,7 +30,7 @@ def write(data: Path, name: str) -> None:
     ]
     folder = data / name
     folder.mkdir(parents=True)
-    (folder / "metrics.json").write_text(json.dumps(metrics_json(name, scores, COST)))
+    (folder / "metrics.json").write_text(json.dumps(metrics_json(name, evaluation(scores), COST)))
 
 
 def test_every_subject_has_its_lines(tmp_path: Path) -> None:

@@ -21,7 +21,7 @@ from facefolds_core.params import CaptureParams, EvaluateParams
 from facefolds_core.rendering.areas import AreaView
 from facefolds_core.scoring.evaluation import evaluate
 from facefolds_core.scoring.perceptual import Perceptual
-from facefolds_core.scoring.report import Circumstances, metrics_json
+from facefolds_core.scoring.report import metrics_json
 from tests.assets import PLAIN
 
 pytestmark = pytest.mark.slow
@@ -80,8 +80,7 @@ class Run:
 
 def judge(scene: Scene, model: Model, asset: Asset, variant: str = "asset") -> Found:
     result = evaluate(scene, model.manifolds, asset, EvaluateParams(films=False), Perceptual(None, None, ()))
-    about = Circumstances(result.matte, 4.0, result.changes, result.patch, result.training)
-    metrics = metrics_json("actor", result.scores, {}, about)
+    metrics = metrics_json("actor", result, {})
     return Found(case="small", scores=scores_of({**metrics, "asset": metrics[variant]}))
 
 

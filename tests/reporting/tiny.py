@@ -22,6 +22,7 @@ from facefolds_core.scoring.report import metrics_json, write_per_image
 from facefolds_core.scoring.sheets import write_contact_sheet
 from tests.assets import make_asset
 from tests.scenes import make_scene
+from tests.scoring.fakes import evaluation
 
 FRAMES = 3
 LAYERS = 3
@@ -74,7 +75,7 @@ def make_subject(root: Path, masks: bool = True) -> SubjectFolders:
     Image.new("RGB", (24, 32), (90, 60, 40)).save(folders.asset / "poster.jpg")
     cost = {"train_seconds": 12.5, "iterations": 300, "device": "cpu (2 threads)", "triangles": 726}
     cost |= {"mesh_bytes": 1000, "texture_bytes": 2000, "reflection_bytes": 4000}
-    write_json(folders.metrics, metrics_json("spheres", scores(masks), cost))
+    write_json(folders.metrics, metrics_json("spheres", evaluation(scores(masks)), cost))
     folders.evaluation.mkdir()
     write_per_image(scores(masks), folders.evaluation / "per_image.parquet")
     write_seen(folders, masks)

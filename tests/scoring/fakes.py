@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 import torch
@@ -18,6 +18,7 @@ from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.geometry.track import Track
 from facefolds_core.model import RadianceManifolds
 from facefolds_core.model.storage import ModelSpec, build_model
+from facefolds_core.scoring.panels import Evaluation, ImageScore, Panel
 from tests.scenes import look_at_origin, make_scene
 
 SIZE = 32
@@ -52,6 +53,11 @@ def tiny_model(view_bias: float = 0.0) -> RadianceManifolds:
     with torch.no_grad():
         biases[0].fill_(view_bias)
     return model
+
+
+def evaluation(scores: list[ImageScore], **found: Any) -> Evaluation:
+    """Of scores alone, without pictures."""
+    return Evaluation(scores, [], cast(Panel, None), **found)
 
 
 def pictures() -> NDArray[np.uint8]:

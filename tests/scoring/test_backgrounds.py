@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from facefolds_core.captures.cutout import foreground
-from facefolds_core.scoring.backgrounds import Cutout, patch_side, squared_error, worst_patch
-from facefolds_core.scoring.images import Rendering, over_any
+from facefolds_core.scoring.backgrounds import Cutout, Rendering, find_patch, patch_side, squared_error, worst_patch
+from facefolds_core.scoring.images import over_any
 from facefolds_core.scoring.matte import opacity_errors
-from facefolds_core.scoring.patches import find_patch
 
 SIZE = 48
 

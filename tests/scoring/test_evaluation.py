@@ -16,11 +16,11 @@ from facefolds_core.files.frame_store import write_frames
 from facefolds_core.geometry.track import Track
 from facefolds_core.params import EvaluateParams
 from facefolds_core.rendering.pixels import finer, pixel_means
-from facefolds_core.scoring.evaluation import Evaluation, evaluate
+from facefolds_core.scoring.evaluation import evaluate
 from facefolds_core.scoring.images import MASK_MARGIN, score_images, subject_box
 from facefolds_core.scoring.metrics import MAX_PSNR
 from facefolds_core.scoring.model_view import ModelView
-from facefolds_core.scoring.panels import ALL_METRICS, METRICS, SUBJECT_METRICS, VARIANTS
+from facefolds_core.scoring.panels import ALL_METRICS, METRICS, SUBJECT_METRICS, VARIANTS, Evaluation
 from facefolds_core.scoring.perceptual import Perceptual, find_perceptual
 from tests.assets import make_asset
 from tests.geometry.test_track import about

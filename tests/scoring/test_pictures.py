@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from facefolds_core.scoring.backgrounds import Patch
+from facefolds_core.scoring.backgrounds import Patch, WorstPatch
 from facefolds_core.scoring.panels import ImageScore, Panel
-from facefolds_core.scoring.patches import WorstPatch
 from facefolds_core.scoring.pictures import write_worst
 
 PHOTO, ASSET = np.full((8, 6, 3), 51 / 255), np.full((8, 6, 3), 102 / 255)

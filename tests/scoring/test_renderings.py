@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from facefolds_core.scoring.images import Rendering, Values, score_renderings
+from facefolds_core.scoring.backgrounds import Rendering
+from facefolds_core.scoring.images import Values, score_renderings
 from facefolds_core.scoring.metrics import MAX_PSNR
 from facefolds_core.scoring.panels import FOUND_METRICS
 from facefolds_core.scoring.perceptual import Perceptual

@@ -18,7 +18,6 @@ from facefolds_core.scoring.panels import ALL_METRICS, FILM_METRICS, VARIANTS, I
 from facefolds_core.scoring.report import (
     EXPORT_STAGES,
     METRICS_VERSION,
-    Circumstances,
     averages,
     headline,
     metrics_json,
@@ -27,6 +26,7 @@ from facefolds_core.scoring.report import (
 )
 from facefolds_core.scoring.temporal import Change
 from tests.assets import cap_crops, make_asset
+from tests.scoring.fakes import evaluation
 
 COST_KEYS = [
     "train_seconds",
@@ -71,7 +71,7 @@ def test_averages_are_over_images_that_have_a_value() -> None:
 
 def test_metrics_json_has_all_its_keys_and_no_nan(folders: SubjectFolders) -> None:
     cost = read_cost(folders, read_asset(folders.asset).manifest)
-    write_json(folders.metrics, metrics_json("somebody", SCORES, cost))
+    write_json(folders.metrics, metrics_json("somebody", evaluation(SCORES), cost))
     metrics = json.loads(folders.metrics.read_text(), parse_constant=pytest.fail)
     about = ["headline", "matte", "band_pixels", "images", "images_with_mask", "truth_change"]
     places = ["worst_patch", "training_views"]
@@ -121,10 +121,10 @@ def test_a_missing_timing_is_named(folders: SubjectFolders) -> None:
 
 def test_cameras_for_validation_are_averaged_apart() -> None:
     checked = [replace(one, split="validate", values={**one.values, "psnr_subject": 33.0}) for one in SCORES]
-    metrics = metrics_json("somebody", [*SCORES, *checked], {})
+    metrics = metrics_json("somebody", evaluation([*SCORES, *checked]), {})
     assert (metrics["images"], metrics["validate"]["images"]) == (3, 3)
     assert (metrics["asset"]["psnr_subject"], metrics["validate"]["asset"]["psnr_subject"]) == (12, 33)
-    assert "validate" not in metrics_json("somebody", SCORES, {})
+    assert "validate" not in metrics_json("somebody", evaluation(SCORES), {})
 
 
 @pytest.mark.parametrize(
@@ -144,7 +144,6 @@ def test_the_headline_is_what_says_most(values: dict[str, float], best: str) -> 
 
 def test_changes_and_warnings_are_in_it() -> None:
     changes = {"holdout": {"asset": Change(0.5, 20.0, 0.01, 0.1)}}
-    about = Circumstances("found", 4.0, changes, warnings=[fact("matte_is_found")])  # type: ignore[arg-type]
-    metrics = metrics_json("somebody", SCORES, {}, about)
+    metrics = metrics_json("somebody", evaluation(SCORES, changes=changes), {}, [fact("matte_is_found")])
     assert (metrics["asset"]["temporal"], metrics["asset"]["flicker"], metrics["truth_change"]) == (0.5, 0.01, 0.1)
     assert [one["kind"] for one in metrics["warnings"]] == ["matte_is_found"]

@@ -7,8 +7,9 @@ from pathlib import Path
 from facefolds_core.facts import fact
 from facefolds_core.files.paths import SubjectFolders
 from facefolds_core.scoring.panels import ALL_METRICS, VARIANTS, ImageScore
-from facefolds_core.scoring.report import Circumstances, metrics_json
+from facefolds_core.scoring.report import metrics_json
 from facefolds_core.scoring.terminal import result_lines, score_lines
+from tests.scoring.fakes import evaluation
 
 COST = {"mesh_bytes": 200_000, "texture_bytes": 300_000, "reflection_bytes": 0}
 
@@ -19,7 +20,7 @@ def metrics(diffuse: float = 30.0, **values: float) -> dict[str, object]:
         ImageScore("a", "0", v, dict.fromkeys(ALL_METRICS) | {"psnr": 10.0, "psnr_subject": given[v], **values})
         for v in VARIANTS
     ]
-    return metrics_json("anna", scores, COST, Circumstances(warnings=[fact("front_is_guessed")]))
+    return metrics_json("anna", evaluation(scores), COST, [fact("front_is_guessed")])
 
 
 def test_what_nothing_has_is_left_out_and_the_whole_frame_comes_last() -> None:
