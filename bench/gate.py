@@ -23,11 +23,11 @@ from PIL import Image
 from pydantic import Field
 
 from bench.results import ROOT, Entry, Means, Store, commit_name, now
-from bench.run import Project, own_params
+from bench.run import Project, chosen, own_params
 from bench.tables import markdown, number
 from facefolds_core.asset import Asset, read_asset
 from facefolds_core.captures.actor import make_rig
-from facefolds_core.errors import UserError, report_user_errors
+from facefolds_core.errors import report_user_errors
 from facefolds_core.files.writing import atomic_folder, read_json
 from facefolds_core.params import STAGE_SECTIONS, CaptureParams
 from facefolds_core.rendering.areas import view_of
@@ -125,6 +125,15 @@ class Found(Entry):
     commit: str = ""
 
 
+def params_of(case: str, captures: Path) -> dict[str, Any]:
+    """params.yaml of a case, whose subject is called actor."""
+    capture, keys = CASES[case]
+    if not capture:
+        return own_params("actor", keys)
+    subject = {**keys, "path": str((captures / capture).resolve())}
+    return {**own_params("actor", {}), "subjects": {"actor": subject}}
+
+
 def there(captures: Path) -> list[str]:
     """The cases whose captures are there."""
     return [name for name, (capture, _) in CASES.items() if not capture or (captures / capture).is_dir()]
@@ -144,14 +153,14 @@ def strip_of(folder: Path, case: str) -> Path:
 
 def run(case: str, folder: Path, captures: Path) -> Found:
     """Run the stages, draw the strip, keep the figures; in a process of its own, whose children alone are measured."""
-    (capture, keys), project = CASES[case], Project(strip_of(folder, case).with_suffix(""), "actor")
-    params = own_params("actor", {} if capture else keys)
-    if capture:
-        with atomic_folder(folder / f"{project.root.name}_capture") as place:
-            for path in (captures / capture).resolve().iterdir():
+    project, params = Project(strip_of(folder, case).with_suffix(""), "actor"), params_of(case, captures)
+    if CASES[case][0]:
+        own, linked = params["subjects"]["actor"], folder / f"{project.root.name}_capture"
+        with atomic_folder(linked) as place:
+            for path in Path(own["path"]).iterdir():
                 if path.name != "plates" or "no plates" not in case:
                     (place / path.name).symlink_to(path)
-        params["subjects"] = {"actor": {**keys, "path": str(folder.resolve() / f"{project.root.name}_capture")}}
+        own["path"] = str(linked.resolve())
     project.write(params)
     project.run("configure", *STAGE_SECTIONS)
     used, metrics = resource.getrusage(resource.RUSAGE_CHILDREN), read_json(project.folders.metrics)
@@ -222,9 +231,7 @@ def main(
     accept: Annotated[bool, typer.Option("--accept", help="Keep the figures, whatever they are.")] = False,
 ) -> None:
     """Measure what FOLDER/gate.json does not have of this commit, and hold it against what is kept."""
-    names = [name.strip() for name in only.split(";")] if only else there(captures)
-    if unknown := set(names) - set(CASES):
-        raise UserError("no such case", place="--only", found="; ".join(unknown), expected="; ".join(CASES))
+    names = chosen(only, tuple(CASES), "--only") if only else there(captures)
     for case in CASES.keys() - {*there(captures)}:
         typer.echo(f"skipped: {case}: no {CASES[case][0]} in {captures}")
     store = Store(folder / "gate.json", "gate", Found)

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any
@@ -24,6 +23,7 @@ from facefolds_core.scoring.images import score_images
 from facefolds_core.scoring.metrics import shown
 from facefolds_core.scoring.model_view import ModelView
 from facefolds_core.scoring.perceptual import Perceptual
+from facefolds_core.system.processes import own_environment
 
 Sections = Mapping[str, Mapping[str, Any]]
 
@@ -46,8 +46,7 @@ class Project:
 
     def begin(self, stage: str, stdout: int | IO[str], stderr: int | IO[str]) -> subprocess.Popen[str]:
         """A stage's command with this checkout's code."""
-        path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ.get('PATH', '')}"
-        environment = {**os.environ, "PYTHONPATH": str(ROOT), "PATH": path}
+        environment = own_environment(PYTHONPATH=str(ROOT))
         command = [sys.executable, "-m", f"stages.{stage}", "--subject", self.subject]
         return subprocess.Popen(command, cwd=self.root, env=environment, stdout=stdout, stderr=stderr, text=True)
 
@@ -80,6 +79,18 @@ def own_params(subject: str, changes: Sections, path: Path = ROOT / "params.yaml
     if entry.get("source") != "actor":
         entry["path"] = str((path.parent / entry["path"]).resolve())
     return {**params, "subjects": {subject: entry}}
+
+
+def chosen(given: str, known: Sequence[str], option: str) -> list[str]:
+    """Names between semicolons; all, if there are none.
+
+    Raises:
+        UserError: if one is not known; names the option.
+    """
+    names = [name.strip() for name in given.split(";") if name.strip()] or list(known)
+    if unknown := set(names) - set(known):
+        raise UserError("no such name", place=option, found="; ".join(sorted(unknown)), expected="; ".join(known))
+    return names
 
 
 def score_model(

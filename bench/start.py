@@ -19,11 +19,11 @@ import typer
 from numpy.typing import NDArray
 from PIL import Image
 
-from bench.gate import CASES
+from bench.gate import params_of, there
 from bench.results import ROOT
-from bench.run import Project, own_params
+from bench.run import Project, chosen
 from facefolds_core.captures.scene import Scene, read_scene
-from facefolds_core.errors import UserError, report_user_errors
+from facefolds_core.errors import report_user_errors
 from facefolds_core.scoring.matte import interior_and_band, matte_errors
 from facefolds_core.scoring.metrics import psnr
 from facefolds_core.subject.drawing import render
@@ -37,8 +37,8 @@ from facefolds_core.subject.splats import Splats
 
 Array = NDArray[np.float64]
 
-CAPTURES = {name: CASES[name][1] for name in ("actor", "clutter", "mugsy", "studio", "sparse", "buddha", "fox")}
-"""Name -> the subject's keys; the first two are the actor of params.yaml."""
+CAPTURES = ("actor", "clutter", "mugsy", "studio", "sparse", "buddha", "fox")
+"""The first two are the actor of params.yaml."""
 BAND = 4
 """Pixels on both sides of an outline."""
 SHOWN = 3
@@ -49,12 +49,8 @@ def scene_of(name: str, folder: Path, captures: Path) -> Scene:
     """A capture's scene, made once."""
     project = Project(folder / name, "actor")
     if not (project.folders.scene / "scene.json").exists():
-        keys = CAPTURES[name]
-        params = own_params("actor", {} if "source" in keys else keys)
-        if "source" in keys:
-            params["subjects"] = {"actor": {**keys, "path": str((captures / name).resolve())}}
-        project.write(params)
-        project.run("configure", *(["capture"] if "source" not in keys else []), "normalize")
+        project.write(params_of(name, captures))
+        project.run("configure", "capture", "normalize")
     return read_scene(project.folders.scene)
 
 
@@ -110,18 +106,16 @@ def measure(name: str, scene: Scene, seen: bool, sheet: Path) -> str:
 @report_user_errors("start")
 def main(
     folder: Annotated[Path, typer.Argument(help="Where scenes and sheets are kept.")],
-    only: Annotated[str, typer.Option(help="Some captures, separated by semicolons.")] = "; ".join(CAPTURES),
+    only: Annotated[str, typer.Option(help="Some captures, separated by semicolons; by default all.")] = "",
     captures: Annotated[Path, typer.Option(help="Folder of the captures.")] = ROOT / "../shared/captures",
     seen: Annotated[bool, typer.Option("--seen", help="Fit held-out pictures, too: for what mattes score.")] = False,
 ) -> None:
     """Print the figures of all captures that are there."""
-    names = [name.strip() for name in only.split(";")]
-    if unknown := set(names) - set(CAPTURES):
-        raise UserError("no such capture", place="--only", found="; ".join(unknown), expected="; ".join(CAPTURES))
+    names = chosen(only, CAPTURES, "--only")
     typer.echo("| | cameras | Gaussians | subject's | all | all, inside | subject | inside | band | IoU | s | CPU s |")
     typer.echo("|---|---|---|---|---|---|---|---|---|---|---|---|")
     for name in names:
-        if "source" not in CAPTURES[name] or (captures / name).exists():
+        if name in there(captures):
             scene = scene_of(name, folder, captures)
             typer.echo(measure(name, scene, seen, folder / f"{name}{'_seen' if seen else ''}.png"))
 

@@ -23,14 +23,14 @@ import numpy as np
 import typer
 from pydantic import Field
 
-from bench.gate import CASES
+from bench.gate import CASES, params_of, strip_of
 from bench.results import ROOT, Entry, Means, Store, commit_name, now
-from bench.run import Project, own_params
+from bench.run import Project, chosen
 from bench.tables import markdown
 from facefolds_core.captures.found_scene import found_scene
 from facefolds_core.captures.scene import Scene
 from facefolds_core.config.stages import read_train
-from facefolds_core.errors import UserError, report_user_errors
+from facefolds_core.errors import report_user_errors
 from facefolds_core.model.radiance import RadianceManifolds
 from facefolds_core.params import EvaluateParams, ExplicitParams, merged
 from facefolds_core.scoring.backgrounds import Rendering
@@ -127,15 +127,13 @@ def patched(code: Mapping[str, Any]) -> Iterator[None]:
 
 def prepared(case: str, folder: Path, captures: Path) -> Project:
     """A capture's scene and subject, made once."""
-    capture, keys = CASES[case]
-    project = Project(folder / case.replace(", ", "_").replace(" ", "-"), "actor")
+    project = Project(strip_of(folder, case).with_suffix(""), "actor")
     if not (project.folders.subject / "sheet.png").exists():
-        own = keys if capture or "validate" in keys else {**keys, "validate": {"every": 6}}
-        params = own_params("actor", {} if capture else own)
-        if capture:
-            params["subjects"] = {"actor": {**keys, "path": str((captures / capture).resolve())}}
+        params = params_of(case, captures)
+        if not CASES[case][0]:
+            params["subjects"]["actor"].setdefault("validate", {"every": 6})
         project.write(params)
-        project.run("configure", *([] if capture else ["capture"]), "normalize", "subject")
+        project.run("configure", "capture", "normalize", "subject")
     return project
 
 
@@ -190,14 +188,6 @@ def table(store: Store[Worth], cases: Sequence[str]) -> str:
         return " / ".join("-" if one is None or other is None else f"{one - other:+.2f}" for one, other in values)
 
     return markdown(["without", *cases], [[name, *(cell(case, name) for case in cases)] for name in MECHANISMS])
-
-
-def chosen(given: str, known: Sequence[str], option: str) -> list[str]:
-    """Names between semicolons; all, if there are none."""
-    names = [name.strip() for name in given.split(";") if name.strip()] or list(known)
-    if unknown := set(names) - set(known):
-        raise UserError("no such name", place=option, found="; ".join(sorted(unknown)), expected="; ".join(known))
-    return names
 
 
 @report_user_errors("worth")

@@ -10,7 +10,6 @@ hero.zip (asset and page, with the scores and the licence).
 
 from __future__ import annotations
 
-import os
 import shutil
 import subprocess
 import sys
@@ -33,6 +32,7 @@ from facefolds_core.files.writing import atomic_file, atomic_folder, read_json, 
 from facefolds_core.params import merged
 from facefolds_core.scoring.terminal import HEADLINE_WORDS
 from facefolds_core.serving.player import find_player
+from facefolds_core.system.processes import own_environment
 
 NAME = "hero"
 PARAMS = Path(__file__).with_name("hero.yaml")
@@ -68,9 +68,8 @@ def run_pipeline(folder: Path) -> None:
     Raises:
         UserError: if a stage failed; it has said why.
     """
-    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ.get('PATH', '')}"
     command = [sys.executable, "-m", "dvc", "repro", f"evaluate@{NAME}"]
-    if subprocess.run(command, cwd=folder, env={**os.environ, "PATH": path}, check=False).returncode:
+    if subprocess.run(command, cwd=folder, env=own_environment(), check=False).returncode:
         raise UserError("the hero was not made", file=folder, remedy="see above, then the same command again")
 
 

@@ -23,8 +23,7 @@ from facefolds_core.model import RadianceManifolds
 from facefolds_core.model import load_model as read_model
 from facefolds_core.model.device import device_of
 from facefolds_core.scoring.model_view import ModelView
-
-EXPORT = ("sample", "reconstruct", "decimate", "texture", "bake", "compress")
+from facefolds_core.scoring.report import EXPORT_STAGES
 
 
 @dataclass(frozen=True, repr=False)
@@ -78,15 +77,14 @@ class Model:
         Raises:
             UserError: if a section, key or value is wrong, or the result cannot be an asset.
         """
-        unknown = sorted(set(sections) - set(EXPORT))
+        unknown = sorted(set(sections) - set(EXPORT_STAGES))
         if unknown:
-            raise UserError(
-                "no step of the export", place=", ".join(unknown), expected=", ".join(EXPORT), remedy="correct it"
-            )
+            known = ", ".join(EXPORT_STAGES)
+            raise UserError("no step of the export", place=", ".join(unknown), expected=known, remedy="correct it")
         folders = folders_of(self.scene)
-        for stage in EXPORT:
+        for stage in EXPORT_STAGES:
             set_params(folders, stage, sections.get(stage, {}))
-        for stage in EXPORT:
+        for stage in EXPORT_STAGES:
             run(stage, folders, folders.asset)
         if folder is not None:
             with atomic_folder(folder) as temporary:

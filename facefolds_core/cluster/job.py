@@ -27,7 +27,7 @@ from distributed import get_worker
 from facefolds_core.cluster.lockfile import LOCK
 from facefolds_core.cluster.project import Project
 from facefolds_core.errors import UserError
-from facefolds_core.system.processes import with_threads
+from facefolds_core.system.processes import own_environment, with_threads
 
 RUNNING = re.compile(r"Running stage '([^']+)'")
 LOST_RECORD = re.compile(r"^ERROR: .*(\bruns\b.*\.tmp'|join\(\) argument must be .* not 'NoneType')", re.MULTILINE)
@@ -143,9 +143,7 @@ def repro(dvc: Callable[[Sequence[str]], tuple[int, str]], command: Sequence[str
 def _environment(worker: Any) -> dict[str, str]:
     """Of the job's processes: its share of the threads, the programs of this environment."""
     threads = max(1, dask.system.CPU_COUNT // worker.state.nthreads)
-    environment = {**with_threads(threads), **os.environ, "PYTHONUNBUFFERED": "1"}
-    environment["PATH"] = f"{Path(sys.executable).parent}{os.pathsep}{environment.get('PATH', '')}"
-    return environment
+    return {**with_threads(threads), **own_environment(PYTHONUNBUFFERED="1")}
 
 
 def _dvc(

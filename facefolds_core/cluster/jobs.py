@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import os
 import subprocess
 import sys
 import tempfile
@@ -21,6 +20,7 @@ from facefolds_core.errors import UserError
 from facefolds_core.files.parsing import brief, parse_yaml
 from facefolds_core.files.reading import read_text
 from facefolds_core.sweeps.edit import set_for_subject
+from facefolds_core.system.processes import own_environment
 
 BUSY = "is busy, it is being blocked by"
 """DVC says so when another DVC in the folder runs a stage."""
@@ -110,12 +110,11 @@ def record(root: Path, outcomes: Sequence[Outcome], pull: bool, everybody: bool)
 
 def _dvc(root: Path, command: Sequence[str]) -> tuple[int, str]:
     """Exit status of DVC commands, when no other DVC is in their way any more, and what they said."""
-    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ.get('PATH', '')}"
     while True:
         done = subprocess.run(
             [sys.executable, "-m", "facefolds_core.cluster.dvc", *command],
             cwd=root,
-            env={**os.environ, "PATH": path},
+            env=own_environment(),
             capture_output=True,
             text=True,
             check=False,

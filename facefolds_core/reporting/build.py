@@ -23,7 +23,7 @@ from facefolds_core.reporting.facts import Facts, finite, read_facts
 from facefolds_core.scoring.films import read_films
 from facefolds_core.scoring.pictures import WORST, training_picture
 from facefolds_core.scoring.report import headline
-from facefolds_core.scoring.terminal import HEADLINE_WORDS
+from facefolds_core.scoring.terminal import HEADLINE_WORDS, warning_lines
 
 REPORT_NAME = "report.html"
 TEXTURE_SIDE = 320
@@ -96,7 +96,7 @@ def context(subject: Subject) -> dict[str, Any]:
         "poster": pictures.stored(poster) if poster.is_file() else None,
         "generator": manifest.generator,
         "of_what": HEADLINE_WORDS[key],
-        "warnings": warnings(facts.metrics),
+        "warnings": warning_lines(facts.metrics),
         **films(subject),
         "tiles": tiles(subject, key),
         "scores": tables.scores(facts.metrics),
@@ -112,12 +112,6 @@ def context(subject: Subject) -> dict[str, Any]:
         "levels": tables.levels(manifest),
         "config": {name: json.dumps(value, indent=2) for name, value in facts.config.items()},
     }
-
-
-def warnings(metrics: dict[str, Any]) -> list[str]:
-    """What is not well, and what to do."""
-    listed = [str(one.get("words", "")) for one in metrics.get("warnings", ()) if isinstance(one, dict)]
-    return [line.removeprefix("warning: ").removeprefix("note: ") for line in listed]
 
 
 def tiles(subject: Subject, key: str) -> list[dict[str, str]]:
@@ -147,12 +141,12 @@ def worst(subject: Subject) -> dict[str, str] | None:
     if not path.is_file():
         return None
     key = headline(subject.facts.metrics)
-    scored = [one for one in subject.facts.images if getattr(one, key) is not None]
+    scored = [one for one in subject.facts.images if one.values[key] is not None]
     if isinstance(known, dict):
         camera, frame, psnr, what = known["camera"], known["frame"], known["psnr"], "in the square, over grey"
     elif scored:
-        least = min(scored, key=lambda one: getattr(one, key))
-        camera, frame, psnr, what = least.camera, least.frame, getattr(least, key), HEADLINE_WORDS[key]
+        least = min(scored, key=lambda one: one.values[key] or 0.0)
+        camera, frame, psnr, what = least.camera, least.frame, least.values[key], HEADLINE_WORDS[key]
     else:
         return None
     label = words.frame_label(subject.scene.frame_ids if subject.scene else (), frame)

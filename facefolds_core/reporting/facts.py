@@ -15,26 +15,9 @@ from facefolds_core.errors import UserError
 from facefolds_core.files.paths import SubjectFolders
 from facefolds_core.files.reading import STAGE_OUTPUTS, check_regular, is_there, no_memory
 from facefolds_core.files.writing import read_json
-from facefolds_core.scoring.panels import HEADLINES
+from facefolds_core.scoring.panels import HEADLINES, ImageScore
 
 REMEDY = "make it with `dvc repro` (on a fresh machine: `make repro`)"
-
-
-@dataclass(frozen=True)
-class ImageScores:
-    """One row of per_image.parquet, of the asset.
-
-    Attributes:
-        psnr, psnr_subject, psnr_found, psnr_over_plate, psnr_any: dB; None where the value cannot be had.
-    """
-
-    camera: str
-    frame: str
-    psnr: float | None
-    psnr_subject: float | None
-    psnr_found: float | None = None
-    psnr_over_plate: float | None = None
-    psnr_any: float | None = None
 
 
 @dataclass(frozen=True)
@@ -43,7 +26,7 @@ class Facts:
 
     Attributes:
         metrics: metrics.json.
-        images: scores of the asset on each held-out image; empty without evaluation/per_image.parquet.
+        images: HEADLINES of the asset on each held-out image; empty without evaluation/per_image.parquet.
         fit: model/fit.json, of presets that fit the scene first.
         curves: the training log.
         stages: seconds and bytes of each, in the order in which they run.
@@ -51,7 +34,7 @@ class Facts:
     """
 
     metrics: dict[str, Any]
-    images: tuple[ImageScores, ...]
+    images: tuple[ImageScore, ...]
     fit: dict[str, Any] | None
     curves: dict[str, list[tuple[float, float]]]
     stages: dict[str, tuple[float | None, int | None]]
@@ -115,7 +98,7 @@ def read_mapping(path: Path) -> dict[str, Any] | None:
     return value
 
 
-def read_images(path: Path) -> tuple[ImageScores, ...]:
+def read_images(path: Path) -> tuple[ImageScore, ...]:
     """The asset's rows of per_image.parquet on held-out cameras, in the file's order; empty where it is not there.
 
     Raises:
@@ -134,7 +117,7 @@ def read_images(path: Path) -> tuple[ImageScores, ...]:
     except (pa.ArrowException, OSError, KeyError, ValueError, TypeError, OverflowError) as error:
         raise UserError("damaged scores", file=path, found=str(error), remedy=REMEDY) from None
     return tuple(
-        ImageScores(row["camera"], row["frame"], **{name: finite(row.get(name)) for name in HEADLINES})
+        ImageScore(row["camera"], row["frame"], "asset", {name: finite(row.get(name)) for name in HEADLINES})
         for row in rows
         if row["variant"] == "asset" and row.get("split", "holdout") == "holdout"
     )

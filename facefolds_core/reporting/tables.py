@@ -12,9 +12,9 @@ from facefolds_core.asset.manifest import Manifest
 from facefolds_core.files.reading import STAGE_OUTPUTS
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.reporting.charts import heat_colour, ink_on
-from facefolds_core.reporting.facts import ImageScores, finite
+from facefolds_core.reporting.facts import finite
 from facefolds_core.reporting.words import count, duration, number, size
-from facefolds_core.scoring.panels import VARIANTS
+from facefolds_core.scoring.panels import VARIANTS, ImageScore
 
 Row = dict[str, Any]
 
@@ -84,9 +84,9 @@ def scores(metrics: dict[str, Any]) -> dict[str, Any]:
     return {"groups": groups, "names": names, "rows": rows}
 
 
-def heat_map(images: Sequence[ImageScores], key: str, places: dict[str, float]) -> Row:
+def heat_map(images: Sequence[ImageScore], key: str, places: dict[str, float]) -> Row:
     """PSNR of every held-out camera and frame."""
-    values = {(image.camera, image.frame): getattr(image, key) for image in images}
+    values = {(image.camera, image.frame): image.values[key] for image in images}
     known = [value for value in values.values() if value is not None]
     low, high = (min(known), max(known)) if known else (0.0, 0.0)
     middle, half = (low + high) / 2, max(HEAT_RANGE, high - low) / 2

@@ -84,17 +84,23 @@ def _line(name: str, cells: list[str]) -> str:
     return f"{name:<{NAME}}" + "".join(f"{cell:>{CELL}}" for cell in cells)
 
 
+def warning_lines(metrics: Mapping[str, Any]) -> list[str]:
+    """What is not well, and what to do."""
+    listed = [str(one.get("words", "")) for one in metrics.get("warnings", ()) if isinstance(one, dict)]
+    return [line.removeprefix("warning: ").removeprefix("note: ") for line in listed if line]
+
+
 def result_lines(metrics: Mapping[str, Any], folders: SubjectFolders) -> list[str]:
     """What there is to know at the end of a run: what is not well, where the asset is, what it weighs, how good it is,
     and how to look at it."""
-    warnings = [line for one in metrics.get("warnings", ()) if (line := str(one.get("words", "")))]
+    warnings = warning_lines(metrics)
     cost, key = metrics["cost"], metrics.get("headline", "psnr")
     size = sum(cost.get(name) or 0 for name in ("mesh_bytes", "texture_bytes", "reflection_bytes"))
     quality = metrics["asset"].get(key)
     good = "not scored" if quality is None else f"{quality:.2f} dB {HEADLINE_WORDS[key]}"
     return [
         *([f"\nwhat is not well ({len(warnings)}):"] if warnings else []),
-        *(f"  {line.removeprefix('warning: ').removeprefix('note: ')}" for line in warnings),
+        *(f"  {line}" for line in warnings),
         f"\n{metrics.get('subject', folders.root.name)}: {folders.asset}, {size / 1e6:.2f} MB, {good}",
         f"look at it:  make view ASSET={folders.asset}   (or: facefolds view {folders.asset})",
         "read of it:  make report",

@@ -1,11 +1,13 @@
-"""A process that ends with the one that started it, however that ended."""
+"""Processes that are started: their environment, and that they end with the one that started them."""
 
 from __future__ import annotations
 
 import os
 import signal
+import sys
 import threading
 import time
+from pathlib import Path
 
 import psutil
 
@@ -25,6 +27,12 @@ GRACE = 10.0
 def with_threads(count: int) -> dict[str, str]:
     """Variables of the environment for a process with so many threads."""
     return {**dict.fromkeys(THREADS, str(count)), OPENBLAS: "1"}
+
+
+def own_environment(**more: str) -> dict[str, str]:
+    """The environment, in which the programs beside this Python are found first, and `more`."""
+    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ.get('PATH', '')}"
+    return {**os.environ, "PATH": path, **more}
 
 
 def end_with_parent() -> None:

@@ -80,7 +80,7 @@ def test_a_fall_fails_aloud_until_it_is_accepted(tmp_path: Path, ran: list[dict[
 def test_captures_that_are_missing_are_skipped_aloud(tmp_path: Path, ran: list[dict[str, Any]]) -> None:
     said = invoke(gate.main, str(tmp_path), "--only", "clutter", "--captures", str(tmp_path / "none"))
     assert "skipped: mugsy: no mugsy in" in said.output
-    assert "no such case" in invoke(gate.main, str(tmp_path), "--only", "nowhere").output
+    assert "no such name" in invoke(gate.main, str(tmp_path), "--only", "nowhere").output
 
 
 @pytest.mark.parametrize("name", gate.TOLERANCES)

@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 from bench.results import Store
-from bench.worth import MECHANISMS, Off, Worth, chosen, patched, table
+from bench.run import chosen
+from bench.worth import MECHANISMS, Off, Worth, patched, table
 from facefolds_core.errors import UserError
 from facefolds_core.params import ExplicitParams, merged
 from facefolds_core.training.explicit import state

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import subprocess
 import sys
 import time
@@ -16,21 +15,17 @@ import psutil
 import pytest
 import yaml
 
+from facefolds_core.system.processes import own_environment
 from tests.cluster.small import make_project
 
 pytestmark = pytest.mark.pipeline
-
-
-def environment(project_root: Path, **more: str) -> dict[str, str]:
-    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
-    return {**os.environ, "PATH": path, "PYTHONPATH": str(project_root), **more}
 
 
 def run(root: Path, project_root: Path, *arguments: str, **more: str) -> tuple[int, str]:
     done = subprocess.run(
         [sys.executable, "-m", *arguments],
         cwd=root,
-        env=environment(project_root, **more),
+        env=own_environment(PYTHONPATH=str(project_root), **more),
         capture_output=True,
         text=True,
         timeout=200,
@@ -49,7 +44,7 @@ def dask_cluster(
     """A scheduler and two workers, each with room for one job; a worker that is killed is not started again."""
     log = (tmp_path / "dask.log").open("wb")
     address = tmp_path / "scheduler.json"
-    env = environment(project_root, **more)
+    env = own_environment(PYTHONPATH=str(project_root), **more)
 
     def start(*command: str) -> subprocess.Popen[bytes]:
         full = [sys.executable, "-m", "dask", *command, "--scheduler-file", str(address), "--no-dashboard"]
@@ -100,7 +95,7 @@ def test_a_killed_workers_job_runs_again_elsewhere(tmp_path: Path, project_root:
         process = subprocess.Popen(
             command,
             cwd=root,
-            env=environment(project_root),
+            env=own_environment(PYTHONPATH=str(project_root)),
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             text=True,

@@ -6,11 +6,10 @@ import json
 from pathlib import Path
 
 import pytest
-import typer
 from click.testing import Result
 from typer.testing import CliRunner
 
-from facefolds_core.cli.scores import command
+from facefolds_core.cli import app
 from facefolds_core.scoring.panels import ALL_METRICS, VARIANTS, ImageScore
 from facefolds_core.scoring.report import metrics_json
 from tests.scoring.fakes import evaluation
@@ -19,9 +18,7 @@ COST = {"mesh_bytes": 200_000, "texture_bytes": 300_000, "reflection_bytes": 0}
 
 
 def call(*arguments: str) -> Result:
-    app = typer.Typer()
-    app.command()(command)
-    return CliRunner().invoke(app, arguments)
+    return CliRunner().invoke(app, ["scores", *arguments])
 
 
 def write(data: Path, name: str) -> None:

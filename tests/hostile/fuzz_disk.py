@@ -13,44 +13,28 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, chdir, contextmanager, redirect_stderr, redirect_stdout
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
 
 from facefolds_core.errors import as_user_error
 from facefolds_core.files.paths import SubjectFolders
+from facefolds_core.files.reading import STAGE_OUTPUTS
 from facefolds_core.files.writing import PREFIX, write_json
-from facefolds_core.pipeline.bake import bake
-from facefolds_core.pipeline.capture import capture
-from facefolds_core.pipeline.compress import compress
-from facefolds_core.pipeline.decimate import decimate
-from facefolds_core.pipeline.evaluate import evaluate
-from facefolds_core.pipeline.normalize import normalize
-from facefolds_core.pipeline.reconstruct import reconstruct
-from facefolds_core.pipeline.sample import sample
-from facefolds_core.pipeline.subject import subject
-from facefolds_core.pipeline.texture import texture
-from facefolds_core.pipeline.train import train
 from stages.configure import configure
 from tests.golden import digests
 from tests.hostile.damage import Counts, Outcome, differing, fingerprint, outcome
 
 Stage = Callable[[SubjectFolders], str]
 STAGES: dict[str, tuple[Stage, tuple[str, ...]]] = {
-    # name -> (what it does, its outputs)
     "configure": (lambda folders: configure(folders.root.parent), ("../.config", "../.code")),
-    "capture": (capture, ("capture",)),
-    "normalize": (normalize, ("scene",)),
-    "subject": (subject, ("subject",)),
-    "train": (train, ("model",)),
-    "sample": (sample, ("samples",)),
-    "reconstruct": (reconstruct, ("surfaces",)),
-    "decimate": (decimate, ("meshes",)),
-    "texture": (texture, ("resampled",)),
-    "bake": (bake, ("textures",)),
-    "compress": (compress, ("asset", "asset.glb")),
-    "evaluate": (evaluate, ("evaluation", "metrics.json")),
+    **{
+        name: (getattr(import_module(f"facefolds_core.pipeline.{name}"), name), outputs)
+        for name, outputs in STAGE_OUTPUTS.items()
+    },
 }
+"""Name -> what it does, its outputs."""
 PARAMS = """\
 subjects:
   tight:

@@ -17,6 +17,7 @@ from facefolds_core.files.paths import SubjectFolders
 from facefolds_core.pipeline import running
 from facefolds_core.pipeline.running import alone
 from facefolds_core.system.locks import try_lock
+from facefolds_core.system.processes import own_environment
 
 STAGE = """
 import os, sys, time
@@ -34,8 +35,6 @@ def work(folders):
 run_stage("train", work, "A stage.")
 """
 
-DVC_YAML = "stages:\n  train:\n    cmd: {}\n    outs: [data/x/model]\n"
-
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
@@ -44,9 +43,15 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
+def make_pipeline(folder: Path, command: str) -> None:
+    """For DVC, of one stage."""
+    (folder / ".dvc").mkdir()
+    (folder / ".dvc" / "config").write_text("[core]\n    analytics = false\n    no_scm = true\n")
+    (folder / "dvc.yaml").write_text(f"stages:\n  train:\n    cmd: {command}\n    outs: [data/x/model]\n")
+
+
 def start(folder: Path, root: Path, *command: str, **more: str) -> subprocess.Popen[str]:
-    environment = {**os.environ, "PYTHONPATH": str(root), "DVC_NO_ANALYTICS": "1", **more}
-    environment["PATH"] = f"{Path(sys.executable).parent}{os.pathsep}{environment['PATH']}"
+    environment = own_environment(PYTHONPATH=str(root), DVC_NO_ANALYTICS="1", **more)
     return subprocess.Popen(
         command, cwd=folder, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
     )
@@ -98,9 +103,7 @@ def test_a_killed_run_keeps_nobody_out(folder: Path, project_root: Path) -> None
 @pytest.mark.parametrize(("number", "shell"), [(signal.SIGTERM, ""), (signal.SIGKILL, "true; ")])
 def test_a_stage_ends_with_its_dvc(number: signal.Signals, shell: str, folder: Path, project_root: Path) -> None:
     """With `true;` the shell that DVC starts stays between DVC and the stage."""
-    (folder / ".dvc").mkdir()
-    (folder / ".dvc" / "config").write_text("[core]\n    analytics = false\n    no_scm = true\n")
-    (folder / "dvc.yaml").write_text(DVC_YAML.format(f"{shell}python stage.py --subject x"))
+    make_pipeline(folder, f"{shell}python stage.py --subject x")
     process = start(folder, project_root, sys.executable, "-m", "dvc", "repro", SHELL="/bin/bash")
     stage = wait_for(folder / "ready")
     process.send_signal(number)
@@ -125,9 +128,7 @@ def test_a_stage_started_by_hand_outlives_its_terminal(folder: Path, project_roo
 
 def test_what_ends_while_another_dvc_holds_the_lock_is_recorded(folder: Path, project_root: Path) -> None:
     """DVC gives up after 3 s; the stage therefore waits before it ends."""
-    (folder / ".dvc").mkdir()
-    (folder / ".dvc" / "config").write_text("[core]\n    analytics = false\n    no_scm = true\n")
-    (folder / "dvc.yaml").write_text(DVC_YAML.format("python stage.py --subject x"))
+    make_pipeline(folder, "python stage.py --subject x")
     (folder / "seconds").write_text("1")
     process = start(folder, project_root, sys.executable, "-m", "dvc", "repro")
     wait_for(folder / "ready")

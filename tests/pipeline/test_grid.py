@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import json
-import os
 import shutil
 import subprocess
-import sys
 import tempfile
 import time
 from collections import Counter
@@ -16,6 +14,7 @@ import pytest
 
 from bench.experiments import runs_of
 from facefolds_core.sweeps.table import Run
+from facefolds_core.system.processes import own_environment
 from tests.pipeline.test_dvc_yaml import STAGES
 
 COMPUTING = STAGES[1:]
@@ -46,10 +45,8 @@ class GridProject:
         self.run("git", "-c", "user.name=a", "-c", "user.email=a@b.c", "commit", "--quiet", "--message", "start")
 
     def run(self, *command: str) -> str:
-        path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ.get('PATH', '')}"
-        # Not PYTHONPATH: an experiment's own copy of the project must be the one that runs.
-        kept = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
-        variables = {**kept, "PATH": path, "RAN": str(self.ran), "DVC_NO_ANALYTICS": "1"}
+        variables = own_environment(RAN=str(self.ran), DVC_NO_ANALYTICS="1")
+        variables.pop("PYTHONPATH", None)  # an experiment's own copy of the project must be the one that runs
         # Not a pipe: a queue's workers may hold on to it after their command's end.
         with tempfile.TemporaryFile("w+") as printed:
             done = subprocess.run(command, cwd=self.root, env=variables, stdout=printed, stderr=printed, timeout=900)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import io
-import os
 import runpy
 import shutil
 import subprocess
 import sys
 from contextlib import chdir, redirect_stderr, redirect_stdout
 from pathlib import Path
+
+from facefolds_core.system.processes import own_environment
 
 PARAMS = """\
 subjects:
@@ -75,8 +76,7 @@ class TinyProject:
     @property
     def environment(self) -> dict[str, str]:
         # The copy's code must win over the installed project.
-        path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ.get('PATH', '')}"
-        return {**os.environ, "PATH": path, "PYTHONPATH": str(self.root), "DVC_NO_ANALYTICS": "1"}
+        return own_environment(PYTHONPATH=str(self.root), DVC_NO_ANALYTICS="1")
 
     def start(self, *command: str) -> subprocess.Popen[str]:
         return subprocess.Popen(

@@ -13,7 +13,8 @@ from facefolds_core.errors import UserError
 from facefolds_core.files.paths import SubjectFolders
 from facefolds_core.files.writing import write_text
 from facefolds_core.reporting import charts, tables, words
-from facefolds_core.reporting.facts import ImageScores, read_curves, read_facts, read_images
+from facefolds_core.reporting.facts import read_curves, read_facts, read_images
+from facefolds_core.scoring.panels import ImageScore
 from facefolds_core.scoring.report import write_per_image
 from tests.reporting.tiny import FRAMES, make_subject, scores
 from tests.scenes import look_at_origin
@@ -60,7 +61,9 @@ def test_damaged_scores_of_pictures_are_named(folders: SubjectFolders, tmp_path:
 
 def test_facts_are_those_of_the_files(folders: SubjectFolders) -> None:
     facts = read_facts(folders)
-    assert facts.images[0] == ImageScores("cam3", "000000", 19.0, 24.0)
+    image = facts.images[0]
+    assert (image.camera, image.frame) == ("cam3", "000000")
+    assert {name: value for name, value in image.values.items() if value} == {"psnr": 19.0, "psnr_subject": 24.0}
     assert facts.curves == {"psnr": [(0, 10), (2, 20)]}  # the header and NaN are left out
     assert facts.stages["train"][0] == 10
     assert facts.stages["compress"][1] == sum(path.stat().st_size for path in folders.asset.iterdir())
@@ -101,11 +104,9 @@ def test_cameras_for_validation_are_not_in_the_heat_map(tmp_path: Path) -> None:
 
 def test_a_heat_map_with_gaps() -> None:
     images = [
-        ImageScores("a", "0", 20.0, None),
-        ImageScores("b", "1", math.nan, None),
-        ImageScores("b", "0", 21.0, None),
+        ImageScore(camera, frame, "asset", {"psnr": psnr})
+        for camera, frame, psnr in (("a", "0", 20.0), ("b", "1", None), ("b", "0", 21.0))
     ]
-    images[1] = replace(images[1], psnr=None)
     heat = tables.heat_map(images, "psnr", {})
     assert heat["frames"] == ["0", "1"]
     assert (heat["low"], heat["high"]) == ("19.0", "22.0")  # at least 3 dB, about the middle

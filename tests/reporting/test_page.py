@@ -9,10 +9,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import typer
 from typer.testing import CliRunner
 
-from facefolds_core.cli.report import command
+from facefolds_core.cli import app
 from facefolds_core.cli.scores import evaluated_subjects
 from facefolds_core.errors import UserError
 from facefolds_core.facts import fact
@@ -195,8 +194,6 @@ def test_the_command_finds_the_subjects_that_have_scores(tmp_path: Path) -> None
 
 
 def test_the_command_says_where_the_page_lies(copy: SubjectFolders) -> None:
-    app = typer.Typer()
-    app.command()(command)
-    done = CliRunner().invoke(app, ["--data", str(copy.root.parent)])
+    done = CliRunner().invoke(app, ["report", "--data", str(copy.root.parent)])
     assert done.exit_code == 0
     assert str(copy.root / "report.html") in done.output
