@@ -15,7 +15,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
 from facefolds_core.params.base import Section
-from facefolds_core.params.sections import SECTIONS
+from facefolds_core.params.sections import SECTIONS, section_in
 from facefolds_core.params.subject import Overrides, Subject
 from facefolds_core.params.train import PRESETS
 
@@ -114,7 +114,7 @@ def _tables(kind: type[Section], path: str, seen: dict[type[Section], str]) -> I
     for name, field in kind.model_fields.items():
         inner = section_in(field.annotation)
         if inner is not None:
-            yield f"### `{path}.{name}`{' (a list of these)' if _is_list(field.annotation) else ''}\n"
+            yield f"### `{path}.{name}`{' (a list of these)' if get_origin(field.annotation) is tuple else ''}\n"
             if inner in seen:
                 yield f"The keys of `{seen[inner]}`.\n"
                 continue
@@ -135,7 +135,7 @@ def _table(kind: type[Section], path: str, hidden: set[str]) -> str:
     return _rows(
         (field.alias or name, field)
         for name, field in kind.model_fields.items()
-        if name not in hidden and (not _is_section(field.annotation) or not path)
+        if name not in hidden and not (path and isinstance(field.default, Section))
     )
 
 
@@ -172,25 +172,6 @@ def _alike(kind: type[Section], first: type[Section]) -> str:
     names = [name for name in kind.model_fields if name in first.model_fields and name not in ("model", "preset")]
     keys = ", ".join(f"`{name}` ({json.dumps(kind.model_fields[name].default)})" for name in names)
     return f"It has these keys in common with the model above; its defaults are in brackets: {keys}.\n"
-
-
-def section_in(annotation: Any) -> type[Section] | None:
-    """The section that a key holds, alone or in a list."""
-    if _is_section(annotation):
-        kind: type[Section] = annotation
-        return kind
-    if get_origin(annotation) in (tuple, Union, types.UnionType):
-        found = [section_in(part) for part in get_args(annotation)]
-        return next((kind for kind in found if kind is not None), None)
-    return None
-
-
-def _is_section(annotation: Any) -> bool:
-    return isinstance(annotation, type) and issubclass(annotation, Section)
-
-
-def _is_list(annotation: Any) -> bool:
-    return get_origin(annotation) is tuple
 
 
 def _kind(field: FieldInfo) -> str:

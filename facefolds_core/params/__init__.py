@@ -4,24 +4,19 @@
 needs to change is a constant beside the code that uses it, with its reason.
 """
 
-from facefolds_core.params.base import Section, merged, nested
+from facefolds_core.params.base import Section, merged
 from facefolds_core.params.capture import CaptureParams, NormalizeParams
 from facefolds_core.params.compress import (
     AttentionParams,
     CodecName,
     CompressParams,
-    GlbParams,
     LevelParams,
     MeshCodec,
     StreamParams,
     VideoCodec,
 )
 from facefolds_core.params.evaluate import EvaluateParams, ScoreWarningParams
-from facefolds_core.params.explicit import (
-    ExplicitParams,
-    FollowParams,
-    GridTextureParams,
-)
+from facefolds_core.params.explicit import ExplicitParams
 from facefolds_core.params.export import (
     BakeParams,
     DecimateParams,
@@ -33,7 +28,6 @@ from facefolds_core.params.gaussians import SubjectParams
 from facefolds_core.params.mlp import MlpParams
 from facefolds_core.params.reflection import ReflectionParams
 from facefolds_core.params.sections import SECTIONS, STAGE_SECTIONS, section_of, train_params, user_error
-from facefolds_core.params.segments import SegmentParams
 from facefolds_core.params.subject import FrameRange, HoldoutEvery, Overrides, Subject
 from facefolds_core.params.surfaces import GeometryParams, StartParams
 from facefolds_core.params.train import PRESETS, Preset, TrainParams, TrainSection
@@ -50,11 +44,8 @@ __all__ = [
     "DecimateParams",
     "EvaluateParams",
     "ExplicitParams",
-    "FollowParams",
     "FrameRange",
     "GeometryParams",
-    "GlbParams",
-    "GridTextureParams",
     "HoldoutEvery",
     "LevelParams",
     "MeshCodec",
@@ -67,7 +58,6 @@ __all__ = [
     "SampleParams",
     "ScoreWarningParams",
     "Section",
-    "SegmentParams",
     "StartParams",
     "StreamParams",
     "Subject",
@@ -77,7 +67,6 @@ __all__ = [
     "TrainSection",
     "VideoCodec",
     "merged",
-    "nested",
     "section_of",
     "train_params",
     "user_error",

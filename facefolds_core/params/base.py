@@ -74,9 +74,3 @@ def merged(base: Mapping[str, Any], override: Mapping[str, Any]) -> dict[str, An
         old = result.get(key)
         result[key] = merged(old, value) if isinstance(value, dict) and isinstance(old, dict) else value
     return result
-
-
-def nested(path: str, value: Any) -> dict[str, Any]:
-    """ "textures.learning_rate" and 0.1 -> {"textures": {"learning_rate": 0.1}}."""
-    first, _, rest = path.partition(".")
-    return {first: nested(rest, value) if rest else value}

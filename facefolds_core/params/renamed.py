@@ -24,7 +24,6 @@ GONE: dict[str, str] = {
     "train.lambda_veil": CUT_OUT,
     "train.lambda_solid": CUT_OUT,
     "train.lr_volume": "the stage `subject` fits Gaussians; its section `subject` has keys of its own",
-    "train.moving": "traced rays are kept in temporary files as long as there is room",
     "reconstruct.point_weight": FIXED,
     "reconstruct.trim": FIXED,
     "bake.iterations": "textures fitted to the meshes were no better than the model's own",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from types import UnionType
 from typing import Annotated, Any, Union, cast, get_args, get_origin
 
 from pydantic import BaseModel, TypeAdapter, ValidationError
@@ -95,7 +96,8 @@ def _unknown_key(kind: type[BaseModel], names: list[str]) -> tuple[str, str | No
     *folders, key = names
     holder = kind
     for name in folders:
-        holder = _inner(holder, name) or holder
+        field = holder.model_fields.get(name)  # none for a position in a list
+        holder = (field and section_in(field.annotation)) or holder
     keys = ", ".join(sorted(field.alias or name for name, field in holder.model_fields.items()))
     model = kind.model_fields["model"].default if "model" in kind.model_fields else None
     owner = f" of the model `{model}`" if model else ""
@@ -114,16 +116,10 @@ def _unknown_key(kind: type[BaseModel], names: list[str]) -> tuple[str, str | No
     return expected, None
 
 
-def _inner(kind: type[BaseModel], name: str) -> type[BaseModel] | None:
-    """The class of a nested section, also within lists; None if it is none, or `name` is a position in a list."""
-    field = kind.model_fields.get(name)
-    return None if field is None else _model_in(field.annotation)
-
-
-def _model_in(annotation: Any) -> type[BaseModel] | None:
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+def section_in(annotation: Any) -> type[Section] | None:
+    """The section that a key holds, alone, in a list, or as one of several kinds of values; None if it holds none."""
+    if isinstance(annotation, type) and issubclass(annotation, Section):
         return annotation
-    if get_origin(annotation) in (tuple, Union, Annotated):
-        found = [_model_in(part) for part in get_args(annotation)]
-        return next((kind for kind in found if kind is not None), None)
+    if get_origin(annotation) in (tuple, Union, UnionType, Annotated):
+        return next(filter(None, map(section_in, get_args(annotation))), None)
     return None

@@ -19,7 +19,6 @@ from facefolds_core.params import (
     ExplicitParams,
     MlpParams,
     Section,
-    nested,
     section_of,
     train_params,
 )
@@ -42,6 +41,12 @@ def sections() -> Iterator[tuple[str, Section]]:
     for stage, kinds in SECTIONS.items():
         for kind in kinds:
             yield stage, kind()
+
+
+def nested(path: str, value: Any) -> dict[str, Any]:
+    """ "textures.learning_rate" and 0.1 -> {"textures": {"learning_rate": 0.1}}."""
+    first, _, rest = path.partition(".")
+    return {first: nested(rest, value) if rest else value}
 
 
 def checked(stage: str, section: Section, values: dict[str, Any]) -> Section:
