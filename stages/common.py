@@ -17,7 +17,6 @@ from facefolds_core.pipeline.running import Work, alone, run_alone
 from facefolds_core.system.locks import try_lock
 from facefolds_core.system.processes import end_with_parent
 
-Data = Annotated[Path, typer.Option(help="Folder that holds one folder a subject.")]
 KILLED = "if DVC was killed, and says the next time that a file is corrupted, `facefolds doctor` mends it"
 """What a stage says that ends with its DVC: a DVC that is killed can leave files that stop it before any stage runs."""
 
@@ -34,17 +33,11 @@ def run_stage(name: str, work: Work, help_text: str) -> None:
         help_text: shown by --help.
     """
 
-    def command(
-        subject: Annotated[str, typer.Option(help="Name of the subject in params.yaml; DVC tells it itself.")] = "",
-        data: Data = Path("data"),
-    ) -> None:
-        with report_user_errors(name, KILLED if "DVC_STAGE" in os.environ else ""):
-            end_with_dvc()
-            folders = subject_folders(data, subject or subject_of_dvc_stage(name, os.environ.get("DVC_STAGE", "")))
-            typer.echo(run_alone(name, work, folders))
-            wait_for_other_dvcs()
+    def of_one(subject: str, data: Path) -> str:
+        subject = subject or subject_of_dvc_stage(name, os.environ.get("DVC_STAGE", ""))
+        return run_alone(name, work, subject_folders(data, subject))
 
-    _run(name, command, help_text)
+    _run(name, of_one, help_text)
 
 
 def run_for_all(name: str, work: Callable[[Path], str], help_text: str) -> None:
@@ -54,24 +47,31 @@ def run_for_all(name: str, work: Callable[[Path], str], help_text: str) -> None:
         work: takes the folder that holds one folder a subject.
     """
 
+    def of_all(subject: str, data: Path) -> str:
+        if subject:
+            check_subject_name(subject)
+        with alone(name, data / ".locks"):
+            start = time.perf_counter()
+            made, *notes = work(data).splitlines()
+            return "\n".join([f"{name}: {made} ({time.perf_counter() - start:.1f} s)", *notes])
+
+    _run(name, of_all, help_text)
+
+
+def _run(name: str, work: Callable[[str, Path], str], help_text: str) -> None:
+    """Args: work: takes the subject's name, "" if none is given, and the folder of all; says what was made."""
+
     def command(
-        subject: Annotated[str, typer.Option(help="Not needed: all subjects' files are written.")] = "",
-        data: Data = Path("data"),
+        subject: Annotated[
+            str, typer.Option(help="Name of the subject in params.yaml; DVC tells it itself, `configure` needs none.")
+        ] = "",
+        data: Annotated[Path, typer.Option(help="Folder that holds one folder a subject.")] = Path("data"),
     ) -> None:
         with report_user_errors(name, KILLED if "DVC_STAGE" in os.environ else ""):
             end_with_dvc()
-            if subject:
-                check_subject_name(subject)
-            with alone(name, data / ".locks"):
-                start = time.perf_counter()
-                made, *notes = work(data).splitlines()
-                typer.echo("\n".join([f"{name}: {made} ({time.perf_counter() - start:.1f} s)", *notes]))
+            typer.echo(work(subject, data))
             wait_for_other_dvcs()
 
-    _run(name, command, help_text)
-
-
-def _run(name: str, command: Callable[..., None], help_text: str) -> None:
     command.__doc__ = help_text
     app = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
     app.command(name=name)(command)

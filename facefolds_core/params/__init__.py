@@ -5,7 +5,7 @@ needs to change is a constant beside the code that uses it, with its reason.
 """
 
 from facefolds_core.params.base import Section, merged
-from facefolds_core.params.capture import CaptureParams, NormalizeParams
+from facefolds_core.params.capture import CaptureParams, NormalizeParams, SubjectParams
 from facefolds_core.params.compress import (
     AttentionParams,
     CodecName,
@@ -16,7 +16,7 @@ from facefolds_core.params.compress import (
     VideoCodec,
 )
 from facefolds_core.params.evaluate import EvaluateParams, ScoreWarningParams
-from facefolds_core.params.explicit import ExplicitParams
+from facefolds_core.params.explicit import ExplicitParams, GeometryParams, ReflectionParams, StartParams
 from facefolds_core.params.export import (
     BakeParams,
     DecimateParams,
@@ -24,12 +24,9 @@ from facefolds_core.params.export import (
     SampleParams,
     TextureParams,
 )
-from facefolds_core.params.gaussians import SubjectParams
 from facefolds_core.params.mlp import MlpParams
-from facefolds_core.params.reflection import ReflectionParams
 from facefolds_core.params.sections import SECTIONS, STAGE_SECTIONS, section_of, train_params, user_error
 from facefolds_core.params.subject import FrameRange, HoldoutEvery, Overrides, Subject
-from facefolds_core.params.surfaces import GeometryParams, StartParams
 from facefolds_core.params.train import PRESETS, Preset, TrainParams, TrainSection
 
 __all__ = [

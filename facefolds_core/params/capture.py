@@ -1,4 +1,4 @@
-"""`capture` and `normalize`."""
+"""`capture`, `normalize` and `subject`: what comes before the training."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from facefolds_core.params.base import Count, ImageSide, Section, Share
+from facefolds_core.params.base import Count, ImageSide, Section, Seed, Share
 
 
 class CaptureParams(Section):
@@ -68,3 +68,20 @@ class NormalizeParams(Section):
     still. "auto" uses them where the head turns by more than 2 degrees or shifts by more than 2 % of its size. "found"
     looks for poses in the pictures, as "auto" does where the capture has no tracked mesh; see
     docs/guide/subjects.md."""
+
+
+class SubjectParams(Section):
+    """The subject is found once: Gaussians of one frame, and a matte of every picture. Mattes come from the user
+    (`subjects.NAME.mattes`), from the capture, from clean plates, or else from Gaussians and the pictures' colours."""
+
+    iterations: Annotated[int, Field(ge=1, le=1_000_000)] = 2500
+    """Steps in which Gaussians are fitted, a picture each."""
+
+    fewest: Count = 9000
+    """Gaussians at the end, at least."""
+
+    most: Count = 30_000
+    """Gaussians at the end, at most."""
+
+    seed: Seed = 0
+    """Seed of what is left to chance."""

@@ -12,11 +12,10 @@ from pydantic import BaseModel, TypeAdapter, ValidationError
 from facefolds_core.errors import UserError
 from facefolds_core.files.parsing import brief
 from facefolds_core.params.base import Section
-from facefolds_core.params.capture import CaptureParams, NormalizeParams
+from facefolds_core.params.capture import CaptureParams, NormalizeParams, SubjectParams
 from facefolds_core.params.compress import CompressParams
 from facefolds_core.params.evaluate import EvaluateParams
 from facefolds_core.params.export import BakeParams, DecimateParams, ReconstructParams, SampleParams, TextureParams
-from facefolds_core.params.gaussians import SubjectParams
 from facefolds_core.params.renamed import remedy_for
 from facefolds_core.params.train import PRESETS, TrainParams, TrainSection
 

@@ -19,9 +19,8 @@ from facefolds_core.scoring.evaluation import evaluate as score
 from facefolds_core.scoring.films import FILMS
 from facefolds_core.scoring.panels import Evaluation
 from facefolds_core.scoring.perceptual import find_perceptual
-from facefolds_core.scoring.pictures import WORST, write_training_views, write_worst
+from facefolds_core.scoring.pictures import WORST, write_contact_sheet, write_training_views, write_worst
 from facefolds_core.scoring.report import metrics_json, read_cost, write_per_image
-from facefolds_core.scoring.sheets import write_contact_sheet
 from facefolds_core.scoring.terminal import result_lines, score_lines
 from facefolds_core.scoring.training_scores import bad_views, warnings_of
 from facefolds_core.scoring.warnings import stands_still, training_events, warnings_among

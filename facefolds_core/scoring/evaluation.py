@@ -141,9 +141,9 @@ class _Scorer:
         for k, renderings in rendered(view, self._asset, frames):
             frame, truth = self._scene.frame_ids[k], self._truths.at(index, k)
             _check_finite(renderings, camera.name, frame)
-            values = score_renderings(renderings, truth, self.kind, params.background, params.band, self._perceptual)
-            group = {variant: ImageScore(camera.name, frame, variant, values[variant], split) for variant in values}
             pictures = {variant: shown(one.over(params.background)) for variant, one in renderings.items()}
+            values = score_renderings(renderings, pictures, truth, self.kind, params.band, self._perceptual)
+            group = {variant: ImageScore(camera.name, frame, variant, values[variant], split) for variant in values}
             region = region_of(self.kind, truth, renderings)
             both = pictures["model"], pictures["asset"], group["model"], group["asset"]
             over = None if truth.plate is None else shown(renderings["asset"].over(truth.plate))

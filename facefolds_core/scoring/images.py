@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import torch
-from numpy.typing import ArrayLike
 
 from facefolds_core.scoring.backgrounds import Cutout, Rendering, squared_error, worst_patch
 from facefolds_core.scoring.matte import Region, interior_and_band, matte_errors, opacity_errors
@@ -25,9 +24,9 @@ Values = dict[str, float | None]
 
 def score_renderings(
     renderings: Mapping[str, Rendering],
+    pictures: Mapping[str, Array],
     truth: Truth,
     kind: MatteKind,
-    background: ArrayLike,
     band: float,
     perceptual: Perceptual,
 ) -> dict[str, Values]:
@@ -35,22 +34,22 @@ def score_renderings(
 
     Args:
         renderings: by variant, "model" among them: it is what `found` goes by.
+        pictures: the same over the background colour, as they are shown.
         kind: which opacity says where the subject is.
-        background: RGB shown where a rendering is transparent.
         band: pixels to both sides of the outline.
     """
-    pictures = {variant: shown(one.over(background)) for variant, one in renderings.items()}
     result = score_images(pictures, truth.picture, truth.mask, perceptual)
     cutout, region = cutout_of(kind, truth), region_of(kind, truth, renderings)
-    within = {} if kind == "true" else region_scores(pictures, truth.picture, region, perceptual)
+    found = {}
+    if kind != "true" and region is not None:
+        found = _measured(FOUND_METRICS, pictures, truth.picture, region, perceptual)
     parts = None if truth.mask is None else interior_and_band(truth.mask, band)
     for variant, one in renderings.items():
         values = result[variant]
+        values |= found.get(variant, {})
         values["ssim_high"] = None if region is None else ssim_high(pictures[variant], truth.picture, region)
         if cutout is not None:
             values |= over_any(one, cutout, band)
-        if variant in within:
-            values |= dict(zip(FOUND_METRICS, within[variant], strict=True))
         over = None if truth.plate is None else shown(one.over(truth.plate))
         if over is not None:
             values |= {"psnr_over_plate": psnr(over, truth.picture), "ssim_over_plate": ssim(over, truth.picture)}
@@ -107,31 +106,25 @@ def score_images(
         truth: (H, W, 3).
         mask: (H, W) opacity of the subject, or None.
     """
-    whole, within = _measured(images, truth, None, perceptual), region_scores(images, truth, mask, perceptual)
-    result = {}
-    for name in images:
-        result[name] = dict.fromkeys(ALL_METRICS) | dict(zip(METRICS, whole[name], strict=True))
-        if name in within:
-            result[name] |= dict(zip(SUBJECT_METRICS, within[name], strict=True))
-    return result
-
-
-def region_scores(
-    images: Mapping[str, Array], truth: Array, region: Array | None, perceptual: Perceptual
-) -> dict[str, list[float | None]]:
-    """METRICS of each image, weighted with a region (H, W); nothing where there is none, or it is empty."""
-    return {} if region is None or subject_box(region) is None else _measured(images, truth, region, perceptual)
+    whole = _measured(METRICS, images, truth, None, perceptual)
+    within = {} if mask is None else _measured(SUBJECT_METRICS, images, truth, mask, perceptual)
+    return {name: dict.fromkeys(ALL_METRICS) | whole[name] | within.get(name, {}) for name in images}
 
 
 def _measured(
-    images: Mapping[str, Array], truth: Array, region: Array | None, perceptual: Perceptual
-) -> dict[str, list[float | None]]:
-    """METRICS of each image; with a region weighted with it, perceptual ones of its box alone."""
+    names: Sequence[str], images: Mapping[str, Array], truth: Array, region: Array | None, perceptual: Perceptual
+) -> dict[str, Values]:
+    """METRICS of each image, by `names`; with a region weighted with it, perceptual ones of its box alone, and nothing
+    where it is empty."""
     box = None if region is None else subject_box(region)
+    if region is not None and box is None:
+        return {}
     cut = [image if region is None else (image * region[..., None])[box] for image in [truth, *images.values()]]
     deep = (_distances(metric, cut[1:], cut[0]) for metric in (perceptual.lpips, perceptual.st_lpips))
-    rows = zip(images.items(), *deep, strict=True)
-    return {name: [psnr(image, truth, region), ssim(image, truth, region), *far] for (name, image), *far in rows}
+    return {
+        name: dict(zip(names, [psnr(image, truth, region), ssim(image, truth, region), *far], strict=True))
+        for (name, image), *far in zip(images.items(), *deep, strict=True)
+    }
 
 
 def subject_box(mask: Array) -> tuple[slice, slice] | None:

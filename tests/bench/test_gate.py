@@ -16,6 +16,7 @@ from bench.run import Project
 from facefolds_core.captures.actor import make_rig
 from facefolds_core.files.writing import write_json
 from facefolds_core.params import CaptureParams
+from tests.assets import make_asset
 from tests.bench.test_commands import invoke
 
 GOOD = {name: 20.0 if sign > 0 else 0.05 for name, (sign, _, _) in gate.TOLERANCES.items()}
@@ -99,3 +100,13 @@ def test_each_cost_may_grow_by_its_tolerance_alone(name: str) -> None:
     grown = kept.model_copy(update={name: round(1000 * gate.SHARES[name]) + 1})
     assert [line.split(":")[0] for line in falls(kept, grown)] == [name]
     assert list(falls(kept, kept)) == []
+
+
+def test_a_row_a_colour_a_column_an_azimuth(tmp_path: Path) -> None:
+    white, red = (1.0, 1.0, 1.0), (1.0, 0.0, 0.0)
+    seen = gate.strip(make_asset(tmp_path / "asset"), [-30, 0, 30], [white, red], (24, 32), 30.0)
+    assert seen.shape == (2 * 32, 3 * 24, 3)
+    assert (seen[0, ::24] == 255).all() and (seen[32, ::24] == (255, 0, 0)).all()  # corners show what is behind
+    shown = (seen[:32].min(-1) < 250).reshape(32, 3, 24)
+    assert shown.any((0, 2)).all() and not shown[:, :, 0].any()  # in each picture, and whole
+    assert np.array_equal(seen[:32, ..., 0], seen[32:, ..., 0])  # red is behind both

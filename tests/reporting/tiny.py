@@ -17,9 +17,8 @@ from facefolds_core.rendering.reference import AssetCaster, composite
 from facefolds_core.scoring.films import FILMS, FilmFolder
 from facefolds_core.scoring.metrics import shown
 from facefolds_core.scoring.panels import METRICS, SUBJECT_METRICS, VARIANTS, ImageScore, Panel
-from facefolds_core.scoring.pictures import WORST, write_worst
+from facefolds_core.scoring.pictures import WORST, write_contact_sheet, write_worst
 from facefolds_core.scoring.report import metrics_json, write_per_image
-from facefolds_core.scoring.sheets import write_contact_sheet
 from tests.assets import make_asset
 from tests.scenes import make_scene
 from tests.scoring.fakes import evaluation

@@ -9,7 +9,7 @@ import pytest
 
 from facefolds_core.scoring.backgrounds import Rendering
 from facefolds_core.scoring.images import Values, score_renderings
-from facefolds_core.scoring.metrics import MAX_PSNR
+from facefolds_core.scoring.metrics import MAX_PSNR, shown
 from facefolds_core.scoring.panels import FOUND_METRICS
 from facefolds_core.scoring.perceptual import Perceptual
 from facefolds_core.scoring.truths import MatteKind, Truth
@@ -28,7 +28,8 @@ def rendering(alpha: np.ndarray, colour: np.ndarray = FACE) -> Rendering:
 
 
 def scores(asset: Rendering, truth: Truth = TRUTH, kind: MatteKind = "true", band: float = 3) -> Values:
-    return score_renderings({"model": asset, "asset": asset}, truth, kind, (0, 0, 0), band, NO_WEIGHTS)["asset"]
+    both, pictures = dict.fromkeys(("model", "asset"), asset), dict.fromkeys(("model", "asset"), shown(asset.rgb))
+    return score_renderings(both, pictures, truth, kind, band, NO_WEIGHTS)["asset"]
 
 
 def test_a_true_rendering_is_perfect_over_the_plate_and_poor_over_black() -> None:
