@@ -142,7 +142,7 @@ def train(project: Project, blank: Cell, hazard: Hazard) -> None:
 def scored(model: Path, scene: Scene, truth: Scene) -> dict[str, Any]:
     """Values of a cell: `psnr`, `views`, `flat`. Frames that the training lacked lie between those that it had."""
     times = dict(enumerate(np.interp(truth.times, scene.times, np.arange(scene.num_frames)).tolist()))
-    values = list(score_model(model, truth, times, Perceptual(None, None, ()), torch.device("cpu")))
+    values = list(score_model(model, truth, times, Perceptual(), torch.device("cpu")))
     key = "psnr_subject" if any(v["psnr_subject"] is not None for _, _, v in values) else "psnr"
     seen = dict.fromkeys(at for at, _, _ in values)
     views = {name: mean([v[key] for at, _, v in values if at == name]) for name in seen}

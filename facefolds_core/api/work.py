@@ -19,8 +19,8 @@ from facefolds_core.pipeline.running import run_alone
 _TEMPORARY: list[TemporaryDirectory[str]] = []
 """Folders of this process: they go when Python ends, since a scene or an asset may be used until then."""
 
-OPENED = ("scene", "subject", "model", "asset")
-"""What is taken over of a subject's folder that is opened."""
+OPENED = ("subject", "model", "asset")
+"""What is taken over of a subject's folder that is opened, beside the scene."""
 
 
 def new_folders(name: str, folder: str | Path | None) -> SubjectFolders:
@@ -104,7 +104,7 @@ def open_folders(scene: Scene, folder: str | Path | None) -> SubjectFolders:
             )
         folders.root.mkdir(parents=True)
         folders.scene.symlink_to(scene.folder.resolve())
-        for name in OPENED[1:]:
+        for name in OPENED:
             if (home.root / name).exists():
                 (folders.root / name).symlink_to(home.root / name)
         for there, here in ((home.config, folders.config), (home.timing("x").parent, folders.timing("x").parent)):

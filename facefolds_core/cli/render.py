@@ -50,8 +50,9 @@ OWN_RATE = 24
 WIDEST = 55.0
 """Degrees to each side, of a turntable."""
 FILM = VideoCodec(crf=16, preset="medium")
+SMALLEST_SIDE = 16
 LARGEST_SIDE = 16_384
-"""Pixels, with anti-aliasing: what graphics drivers draw at once."""
+"""Pixels; the latter with anti-aliasing: what graphics drivers draw at once."""
 LIMITS = {
     "azimuth": (-3600.0, 3600.0),
     "elevation": (-3600.0, 3600.0),
@@ -85,8 +86,8 @@ def parse_size(text: str, film: bool) -> tuple[int, int]:
     """
     match = re.fullmatch(r"([0-9]{1,5})x([0-9]{1,5})", text)
     size = (int(match[1]), int(match[2])) if match else (0, 0)
-    if min(size) < 16 or (film and (size[0] % 2 or size[1] % 2)):
-        expected = f"WIDTHxHEIGHT in pixels, at least 16{', even' if film else ''}"
+    if min(size) < SMALLEST_SIDE or (film and (size[0] % 2 or size[1] % 2)):
+        expected = f"WIDTHxHEIGHT in pixels, at least {SMALLEST_SIDE}{', even' if film else ''}"
         raise _refused("size", "no size for a picture", expected, text, "such as 1280x720")
     return size
 
@@ -152,7 +153,13 @@ def _from_file(path: Path) -> Camera:
         width, height = int(value["width"]), int(value["height"])
         rotation = w2c[:, :3]
         sound = K.shape == (3, 3) and w2c.shape == (3, 4) and np.isfinite(K).all() and np.isfinite(w2c).all()
-        sound = sound and min(width, height) >= 16 and max(width, height) <= 16_384 and K[0, 0] > 0 and K[1, 1] > 0
+        sound = (
+            sound
+            and min(width, height) >= SMALLEST_SIDE
+            and max(width, height) <= LARGEST_SIDE
+            and K[0, 0] > 0
+            and K[1, 1] > 0
+        )
         sound = sound and np.abs(rotation @ rotation.T - np.eye(3)).max() < 1e-2 and np.linalg.det(rotation) > 0
     except (KeyError, TypeError, ValueError, IndexError):
         sound = False

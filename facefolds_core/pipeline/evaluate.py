@@ -2,28 +2,32 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
+from pathlib import Path
+from typing import Any
 
 from facefolds_core.asset import Asset, read_asset
 from facefolds_core.captures.found_scene import found_scene
 from facefolds_core.captures.scene import Scene
 from facefolds_core.config.stages import read_stage, read_train
-from facefolds_core.facts import Fact, fact
+from facefolds_core.facts import WARNINGS, Fact, fact, read_fact
 from facefolds_core.files.paths import SubjectFolders
-from facefolds_core.files.writing import atomic_folder, write_json
+from facefolds_core.files.reading import is_there
+from facefolds_core.files.writing import atomic_folder, read_json, write_json
 from facefolds_core.model import load_model
 from facefolds_core.model.device import device_of
 from facefolds_core.packaging.notes import codec_warning
-from facefolds_core.params import EvaluateParams
+from facefolds_core.params import EvaluateParams, ScoreWarningParams
 from facefolds_core.scoring.evaluation import evaluate as score
 from facefolds_core.scoring.films import FILMS
 from facefolds_core.scoring.panels import Evaluation
 from facefolds_core.scoring.perceptual import find_perceptual
 from facefolds_core.scoring.pictures import WORST, write_contact_sheet, write_training_views, write_worst
 from facefolds_core.scoring.report import metrics_json, read_cost, write_per_image
+from facefolds_core.scoring.temporal import Change
 from facefolds_core.scoring.terminal import result_lines, score_lines
 from facefolds_core.scoring.training_scores import bad_views, warnings_of
-from facefolds_core.scoring.warnings import stands_still, training_events, warnings_among
 
 
 def noticed(folders: SubjectFolders, scene: Scene, asset: Asset, result: Evaluation) -> tuple[Fact, ...]:
@@ -40,6 +44,42 @@ def noticed(folders: SubjectFolders, scene: Scene, asset: Asset, result: Evaluat
             *stands_still(result.changes.get("holdout", {}), scene.num_frames, limits),
         ]
     )
+
+
+def stands_still(changes: Mapping[str, Change], frames: int, params: ScoreWarningParams) -> list[Fact]:
+    """A fact where little of what changes from frame to frame is shown.
+
+    Args:
+        changes: by variant.
+        frames: of the scene.
+    """
+    asset, model = changes.get("asset"), changes.get("model")
+    if asset is None or model is None or asset.temporal is None or model.temporal is None:
+        return []
+    moves = frames >= params.min_frames and (asset.truth_change or 0.0) >= params.min_change
+    if not moves or asset.temporal >= params.min_temporal:
+        return []
+    return [fact("stands_still", asset=asset.temporal, model=model.temporal, under=params.min_temporal)]
+
+
+def training_events(fit: Path) -> list[Fact]:
+    """What happened to a training, from its fit.json; nothing where it has none, and what is no fact is left out."""
+    if not is_there(fit):
+        return []
+    value: Any = read_json(fit, remedy="run `dvc repro`: the stage train will run again")
+    events = value.get("events") if isinstance(value, dict) else None
+    found = []
+    for event in events if isinstance(events, list) else []:
+        try:
+            found.append(read_fact(event))
+        except ValueError:
+            continue
+    return found
+
+
+def warnings_among(facts: Sequence[Fact]) -> tuple[Fact, ...]:
+    """Those that ask for something to be done, each once."""
+    return tuple({str(one): one for one in facts if one.kind in WARNINGS}.values())
 
 
 def evaluate(folders: SubjectFolders) -> str:

@@ -2,22 +2,29 @@
 
 from __future__ import annotations
 
+import base64
+import io
 import json
 from dataclasses import asdict, dataclass
 from datetime import datetime
+from mimetypes import guess_type
 from pathlib import Path
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
+from PIL import Image
 
 from facefolds_core.asset import Asset, read_asset
 from facefolds_core.captures.scene import Scene, read_scene
 from facefolds_core.captures.sketch import sketch
+from facefolds_core.errors import UserError
 from facefolds_core.facts import worded
 from facefolds_core.files.paths import SubjectFolders
+from facefolds_core.files.pictures import DamagedPictureError, open_picture
+from facefolds_core.files.reading import remake
 from facefolds_core.files.writing import write_text
-from facefolds_core.reporting import charts, pictures, tables, words
+from facefolds_core.reporting import charts, tables, words
 from facefolds_core.reporting.face import face
 from facefolds_core.reporting.facts import Facts, finite, read_facts
 from facefolds_core.scoring.films import read_films
@@ -26,7 +33,11 @@ from facefolds_core.scoring.report import headline
 from facefolds_core.scoring.terminal import HEADLINE_WORDS, warning_lines
 
 REPORT_NAME = "report.html"
-TEXTURE_SIDE = 320
+QUALITY = 85
+"""Of WebP."""
+SHEET_SIZE = (2600, 16_000)
+TEXTURE_SIZE = (320, 320)
+"""Pixels that the contact sheet, and a texture, have at most."""
 MOST_FILM_BYTES = 8_000_000
 """Of all films in the page together."""
 
@@ -93,14 +104,14 @@ def context(subject: Subject) -> dict[str, Any]:
         "subject": facts.metrics.get("subject", manifest.subject),
         "made": datetime.now().astimezone().strftime("%Y-%m-%d %H:%M %Z"),
         "face": face(subject.asset, subject.player),
-        "poster": pictures.stored(poster) if poster.is_file() else None,
+        "poster": stored(poster) if poster.is_file() else None,
         "generator": manifest.generator,
         "of_what": HEADLINE_WORDS[key],
         "warnings": warning_lines(facts.metrics),
         **films(subject),
         "tiles": tiles(subject, key),
         "scores": tables.scores(facts.metrics),
-        "sheet": pictures.sheet(sheet) if sheet.is_file() else None,
+        "sheet": contact_sheet(sheet) if sheet.is_file() else None,
         "heat": tables.heat_map(facts.images, key, places) if facts.images else None,
         "camera_map": Markup(sketch(scene)) if scene else None,
         "worst": worst(subject),
@@ -150,7 +161,7 @@ def worst(subject: Subject) -> dict[str, str] | None:
     else:
         return None
     label = words.frame_label(subject.scene.frame_ids if subject.scene else (), frame)
-    return {"src": pictures.stored(path), "words": f"camera {camera}, frame {label}; {words.number(psnr)} dB {what}"}
+    return {"src": stored(path), "words": f"camera {camera}, frame {label}; {words.number(psnr)} dB {what}"}
 
 
 def bad_views(subject: Subject) -> list[dict[str, str]]:
@@ -159,7 +170,7 @@ def bad_views(subject: Subject) -> list[dict[str, str]]:
     facts = [one for one in subject.facts.metrics.get("warnings", ()) if isinstance(one, dict)]
     cameras = [str(one.get("camera")) for one in facts if one.get("kind") == "training_view_bad"]
     paths = {camera: training_picture(subject.evaluation / "pictures", camera) for camera in cameras}
-    return [{"camera": camera, "src": pictures.stored(path)} for camera, path in paths.items() if path in there]
+    return [{"camera": camera, "src": stored(path)} for camera, path in paths.items() if path in there]
 
 
 def films(subject: Subject) -> dict[str, Any]:
@@ -175,7 +186,7 @@ def films(subject: Subject) -> dict[str, Any]:
             continue
         room -= size
         labels = [words.frame_label(scene.frame_ids if scene else (), name) for name in film.frames]
-        kept.append({**asdict(film), "labels": labels, "src": pictures.stored(path)})
+        kept.append({**asdict(film), "labels": labels, "src": stored(path)})
     both = (2 * scene.width, scene.height) if scene else (2, 1)
     return {"films": kept, "films_left": left, "film_size": both}
 
@@ -193,9 +204,36 @@ def textures(subject: Subject) -> dict[str, Any]:
             {
                 "name": f"layer {i + 1}",
                 "size": f"{rgba.shape[1]} × {rgba.shape[0]}",
-                "src": pictures.texture(rgba, TEXTURE_SIDE),
+                "src": webp(Image.fromarray(rgba), TEXTURE_SIZE),
                 "opaque": words.percent(float((rgba[..., 3] >= 128).mean())),
             }
             for i, rgba in enumerate(asset.frame(frame))
         ],
     }
+
+
+def contact_sheet(path: Path) -> str:
+    """A large PNG as a data URI.
+
+    Raises:
+        UserError: if it is damaged.
+    """
+    try:
+        picture = open_picture(path)
+    except (OSError, DamagedPictureError) as error:
+        message = "a picture of the evaluation is damaged"
+        raise UserError(message, file=path, found=str(error), remedy=remake(path)) from None
+    return webp(picture, SHEET_SIZE)
+
+
+def webp(image: Image.Image, most: tuple[int, int]) -> str:
+    """A picture (with alpha, where it has some), made smaller where it is larger than `most`, as a data URI."""
+    image.thumbnail(most, Image.Resampling.LANCZOS)
+    buffer = io.BytesIO()
+    image.save(buffer, "webp", quality=QUALITY, method=4)
+    return f"data:image/webp;base64,{base64.b64encode(buffer.getvalue()).decode()}"
+
+
+def stored(path: Path) -> str:
+    """A file as it is, as a data URI."""
+    return f"data:{guess_type(path.name)[0]};base64,{base64.b64encode(path.read_bytes()).decode()}"

@@ -9,6 +9,8 @@ from markupsafe import Markup
 from matplotlib import colormaps
 
 HEAT = "viridis"
+EQUAL_CONTRAST = 0.179
+"""Luminance on which black and white are read equally well (WCAG: (L + 0.05) / 0.05 = 1.05 / (L + 0.05))."""
 WIDTH, HEIGHT, MARGIN = 320, 160, 16
 """Of a chart, pixels; above and below the curve there is room for a line of text."""
 
@@ -38,4 +40,4 @@ def ink_on(share: float) -> str:
     """Black or white, whichever is read better on `heat_colour`."""
     red, green, blue, _ = colormaps[HEAT](float(np.clip(share, 0, 1)))
     linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in (red, green, blue)]
-    return "#000000" if 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2] > 0.179 else "#ffffff"
+    return "#000000" if 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2] > EQUAL_CONTRAST else "#ffffff"

@@ -130,9 +130,9 @@ def _enlarged(images: Tensor) -> Tensor:
 class Perceptual:
     """The perceptual metrics that this machine's files allow; `missing` says in words what was not found."""
 
-    lpips: PerceptualDistance | None
-    st_lpips: PerceptualDistance | None
-    missing: tuple[str, ...]
+    lpips: PerceptualDistance | None = None
+    st_lpips: PerceptualDistance | None = None
+    missing: tuple[str, ...] = ()
 
 
 def find_perceptual(device: torch.device | str = "cpu") -> Perceptual:

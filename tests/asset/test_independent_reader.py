@@ -31,7 +31,7 @@ def test_its_score_is_evaluates(tmp_path: Path, codec: str) -> None:
     section = {"video": {"codec": codec, "crf": 20}, "mesh": {"max_error_pixels": 0.1, "compression_level": 7}}
     packaged(tmp_path / "asset", scene, section, weak_reflection())
     asset = read_asset(tmp_path / "asset")
-    scores = evaluate(scene, tiny_model(), asset, EvaluateParams(), Perceptual(None, None, ())).scores
+    scores = evaluate(scene, tiny_model(), asset, EvaluateParams(), Perceptual()).scores
     ours = [s.values["psnr"] for s in scores if s.variant == "asset"]
 
     player, camera = Player(tmp_path / "asset"), scene.cameras[HELD_OUT]

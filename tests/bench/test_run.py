@@ -52,7 +52,7 @@ def test_a_model_is_scored_on_its_held_out_cameras(tmp_path: Path) -> None:
     (tmp_path / "model").mkdir()
     save_model(tiny_model(), SPEC, tmp_path / "model")
     times = {0: 0.0, FRAMES - 1: 1.5}
-    found = list(score_model(tmp_path / "model", scene, times, Perceptual(None, None, ()), torch.device("cpu")))
+    found = list(score_model(tmp_path / "model", scene, times, Perceptual(), torch.device("cpu")))
     assert [(name, k) for name, k, _ in found] == [("front", 0), ("front", FRAMES - 1)]
     assert [v["psnr_subject"] is not None for _, _, v in found] == [True, False]
     assert all(v["psnr"] and 5 < v["psnr"] < 30 for _, _, v in found)

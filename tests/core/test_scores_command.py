@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import pytest
@@ -10,11 +9,8 @@ from click.testing import Result
 from typer.testing import CliRunner
 
 from facefolds_core.cli import app
-from facefolds_core.scoring.panels import ALL_METRICS, VARIANTS, ImageScore
-from facefolds_core.scoring.report import metrics_json
-from tests.scoring.fakes import evaluation
-
-COST = {"mesh_bytes": 200_000, "texture_bytes": 300_000, "reflection_bytes": 0}
+from facefolds_core.files.writing import write_json
+from tests.scoring.test_terminal import metrics
 
 
 def call(*arguments: str) -> Result:
@@ -22,12 +18,7 @@ def call(*arguments: str) -> Result:
 
 
 def write(data: Path, name: str) -> None:
-    scores = [
-        ImageScore("a", "0", v, dict.fromkeys(ALL_METRICS) | {"psnr": 9.0, "psnr_subject": 30.0}) for v in VARIANTS
-    ]
-    folder = data / name
-    folder.mkdir(parents=True)
-    (folder / "metrics.json").write_text(json.dumps(metrics_json(name, evaluation(scores), COST)))
+    write_json(data / name / "metrics.json", metrics(subject=name))
 
 
 def test_every_subject_has_its_lines(tmp_path: Path) -> None:
@@ -36,7 +27,7 @@ def test_every_subject_has_its_lines(tmp_path: Path) -> None:
     done = call("--data", str(tmp_path))
     assert done.exit_code == 0
     for name in ("anna", "ben"):
-        assert f"{name}: {tmp_path / name / 'asset'}, 0.50 MB, 30.00 dB of the subject" in done.output
+        assert f"{name}: {tmp_path / name / 'asset'}, 0.50 MB, 29.00 dB of the subject" in done.output
 
 
 def test_one_may_be_named(tmp_path: Path) -> None:

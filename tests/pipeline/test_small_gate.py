@@ -79,7 +79,7 @@ class Run:
 
 
 def judge(scene: Scene, model: Model, asset: Asset, variant: str = "asset") -> Found:
-    result = evaluate(scene, model.manifolds, asset, EvaluateParams(films=False), Perceptual(None, None, ()))
+    result = evaluate(scene, model.manifolds, asset, EvaluateParams(films=False), Perceptual())
     metrics = metrics_json("actor", result, {})
     return Found(case="small", scores=scores_of({**metrics, "asset": metrics[variant]}))
 

@@ -27,12 +27,10 @@ from tests.geometry.test_track import about
 from tests.scenes import look_at_origin
 from tests.scoring.fakes import FRAMES, SIZE, FlatAsset, flat_asset, flat_scene, half_mask, pictures, tiny_model
 
-NO_PERCEPTUAL = Perceptual(None, None, ())
-
 
 def run(folder: Path, params: EvaluateParams | None = None, **masks: object) -> Evaluation:
     scene = flat_scene(folder, **masks)  # type: ignore[arg-type]
-    return evaluate(scene, tiny_model(), flat_asset(), params or EvaluateParams(), NO_PERCEPTUAL)
+    return evaluate(scene, tiny_model(), flat_asset(), params or EvaluateParams(), Perceptual())
 
 
 def test_every_image_has_every_score_and_an_asset_that_shows_the_truth_is_perfect(tmp_path: Path) -> None:
@@ -54,11 +52,11 @@ def test_an_asset_stands_where_its_own_track_says(tmp_path: Path) -> None:
     world = tuple(camera.transformed(track.at(0)) for camera in scene.cameras)
     moved = replace(scene, cameras=world, poses=track)
     asset = cast(Asset, FlatAsset(pictures(), track))
-    found = evaluate(moved, tiny_model(), asset, EvaluateParams(), NO_PERCEPTUAL)
-    still = evaluate(scene, tiny_model(), flat_asset(), EvaluateParams(), NO_PERCEPTUAL)
+    found = evaluate(moved, tiny_model(), asset, EvaluateParams(), Perceptual())
+    still = evaluate(scene, tiny_model(), flat_asset(), EvaluateParams(), Perceptual())
     psnrs = [s.values["psnr"] for s in found.scores]
     assert psnrs == pytest.approx([s.values["psnr"] for s in still.scores], abs=1e-3)
-    without = evaluate(moved, tiny_model(), flat_asset(), EvaluateParams(), NO_PERCEPTUAL)
+    without = evaluate(moved, tiny_model(), flat_asset(), EvaluateParams(), Perceptual())
     assert all(cast(float, s.values["psnr"]) < 20 for s in without.scores if s.variant == "asset")
 
 
@@ -83,7 +81,7 @@ def test_an_error_outside_the_mask_spares_the_subject() -> None:
 def test_the_background_shows_where_the_model_is_transparent(tmp_path: Path) -> None:
     scene = flat_scene(tmp_path)
     panels = [
-        evaluate(scene, tiny_model(), flat_asset(), EvaluateParams(background=b), NO_PERCEPTUAL).panels[0].model
+        evaluate(scene, tiny_model(), flat_asset(), EvaluateParams(background=b), Perceptual()).panels[0].model
         for b in ((0.0, 0.0, 0.0), (0.2, 0.4, 0.6))
     ]
     corner = [panel[0, 0] for panel in panels]
@@ -114,7 +112,7 @@ def test_a_view_of_the_model_is_what_the_model_renders(view_effects: bool) -> No
 def test_the_shipped_files_are_what_is_scored(tmp_path: Path) -> None:
     asset = make_asset(tmp_path / "asset", layers=2, frames=FRAMES, resolution=32)
     scene = flat_scene(tmp_path / "scene")
-    found = evaluate(scene, tiny_model(), asset, EvaluateParams(), NO_PERCEPTUAL)
+    found = evaluate(scene, tiny_model(), asset, EvaluateParams(), Perceptual())
     assert len(found.scores) == FRAMES * len(VARIANTS)
     assert found.panels[0].asset.std() > 0.05
 
@@ -123,20 +121,20 @@ def test_no_held_out_camera_is_refused(tmp_path: Path) -> None:
     scene = flat_scene(tmp_path)
     scene = replace(scene, splits=("train",) * 3)
     with pytest.raises(UserError, match="no held-out camera") as error:
-        evaluate(scene, tiny_model(), flat_asset(), EvaluateParams(), NO_PERCEPTUAL)
+        evaluate(scene, tiny_model(), flat_asset(), EvaluateParams(), Perceptual())
     assert error.value.remedy is not None
     assert "holdout" in error.value.remedy
 
 
 def test_an_asset_with_another_number_of_frames_is_refused(tmp_path: Path) -> None:
     with pytest.raises(UserError, match="asset and the scene have different numbers of frames"):
-        evaluate(flat_scene(tmp_path), tiny_model(), flat_asset(pictures()[:2]), EvaluateParams(), NO_PERCEPTUAL)
+        evaluate(flat_scene(tmp_path), tiny_model(), flat_asset(pictures()[:2]), EvaluateParams(), Perceptual())
 
 
 def test_nan_in_a_rendering_is_caught(tmp_path: Path) -> None:
     model = tiny_model(view_bias=float("nan"))
     with pytest.raises(UserError, match="not finite") as error:
-        evaluate(flat_scene(tmp_path), model, flat_asset(), EvaluateParams(), NO_PERCEPTUAL)
+        evaluate(flat_scene(tmp_path), model, flat_asset(), EvaluateParams(), Perceptual())
     assert error.value.place == "camera front, frame 000000"
 
 
@@ -154,7 +152,7 @@ def test_the_worst_picture_is_kept_though_it_is_not_on_the_sheet(tmp_path: Path)
     shown = pictures()
     shown[1] = 255 - shown[1]
     scene = flat_scene(tmp_path, masks={k: half_mask() for k in range(FRAMES)})
-    found = evaluate(scene, tiny_model(), flat_asset(shown), EvaluateParams(sheet_frames=2), NO_PERCEPTUAL)
+    found = evaluate(scene, tiny_model(), flat_asset(shown), EvaluateParams(sheet_frames=2), Perceptual())
     assert [panel.frame for panel in found.panels] == ["000000", "000002"]
     assert found.worst.frame == "000001"
     np.testing.assert_array_equal(found.worst.asset, shown[1] / 255)
@@ -165,4 +163,4 @@ def test_without_a_photo_there_is_nothing_to_score(tmp_path: Path) -> None:
     picture = np.zeros((SIZE, SIZE, 3), np.uint8)
     write_frames(tmp_path / "frames.arrow", (SIZE, SIZE, 3), [(1, 0, picture)])
     with pytest.raises(UserError, match="has a photo"):
-        evaluate(scene, tiny_model(), flat_asset(), EvaluateParams(), NO_PERCEPTUAL)
+        evaluate(scene, tiny_model(), flat_asset(), EvaluateParams(), Perceptual())

@@ -15,7 +15,6 @@ from facefolds_core.scoring.perceptual import Perceptual
 from facefolds_core.scoring.truths import MatteKind, Truth
 
 SIZE = 32
-NO_WEIGHTS = Perceptual(None, None, ())
 ROOM = np.random.default_rng(0).integers(0, 256, (SIZE, SIZE, 3)) / 255
 FACE = np.random.default_rng(1).integers(0, 256, (SIZE, SIZE, 3)) / 255
 MASK = np.zeros((SIZE, SIZE))
@@ -29,7 +28,7 @@ def rendering(alpha: np.ndarray, colour: np.ndarray = FACE) -> Rendering:
 
 def scores(asset: Rendering, truth: Truth = TRUTH, kind: MatteKind = "true", band: float = 3) -> Values:
     both, pictures = dict.fromkeys(("model", "asset"), asset), dict.fromkeys(("model", "asset"), shown(asset.rgb))
-    return score_renderings(both, pictures, truth, kind, band, NO_WEIGHTS)["asset"]
+    return score_renderings(both, pictures, truth, kind, band, Perceptual())["asset"]
 
 
 def test_a_true_rendering_is_perfect_over_the_plate_and_poor_over_black() -> None:

@@ -14,13 +14,12 @@ from tests.scoring.fakes import evaluation
 COST = {"mesh_bytes": 200_000, "texture_bytes": 300_000, "reflection_bytes": 0}
 
 
-def metrics(diffuse: float = 30.0, **values: float) -> dict[str, object]:
+def metrics(diffuse: float = 30.0, subject: str = "anna") -> dict[str, object]:
     given = {"model": 30.0, "diffuse": diffuse, "asset": 29.0, "asset_diffuse": 29.0}
     scores = [
-        ImageScore("a", "0", v, dict.fromkeys(ALL_METRICS) | {"psnr": 10.0, "psnr_subject": given[v], **values})
-        for v in VARIANTS
+        ImageScore("a", "0", v, dict.fromkeys(ALL_METRICS) | {"psnr": 10.0, "psnr_subject": given[v]}) for v in VARIANTS
     ]
-    return metrics_json("anna", evaluation(scores), COST, [fact("front_is_guessed")])
+    return metrics_json(subject, evaluation(scores), COST, [fact("front_is_guessed")])
 
 
 def test_what_nothing_has_is_left_out_and_the_whole_frame_comes_last() -> None:

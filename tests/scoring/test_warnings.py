@@ -9,8 +9,8 @@ import pytest
 from facefolds_core.facts import fact
 from facefolds_core.files.writing import write_json
 from facefolds_core.params import ScoreWarningParams
+from facefolds_core.pipeline.evaluate import stands_still, training_events, warnings_among
 from facefolds_core.scoring.temporal import Change
-from facefolds_core.scoring.warnings import stands_still, training_events, warnings_among
 
 
 @pytest.mark.parametrize(
