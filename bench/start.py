@@ -39,8 +39,6 @@ Array = NDArray[np.float64]
 
 CAPTURES = ("actor", "clutter", "mugsy", "studio", "sparse", "buddha", "fox")
 """The first two are the actor of params.yaml."""
-BAND = 4
-"""Pixels on both sides of an outline."""
 SHOWN = 3
 """Cameras on a sheet."""
 
@@ -88,7 +86,7 @@ def measure(name: str, scene: Scene, seen: bool, sheet: Path) -> str:
         alone, row = over_plate(scene, index, splats.part(subject)), [psnr(drawn, truth) or np.nan]
         if masks is not None and (index, 0) in masks:
             mask = masks.image(index, 0)[..., 0] / 255.0
-            inside, band = (one.astype(np.float64) for one in interior_and_band(mask, BAND))
+            inside, band = (one.astype(np.float64) for one in interior_and_band(mask))
             row += [psnr(drawn, truth, inside) or np.nan]
             row += [psnr(alone, truth, one) or np.nan for one in (mask, inside, band)]
             row += [matte_errors(mattes[index] / 255.0, mask)["matte_iou"]]

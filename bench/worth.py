@@ -152,10 +152,10 @@ def scores_of(scene: Scene, model: RadianceManifolds) -> Means:
             one = Rendering(*(view.render(float(frame))[k] for k in (0, 2)))
             picture = shown(one.over(params.background))
             off = np.square(picture - truth.picture).mean(-1)
-            any_background = over_any(one, cutout, params.band)["psnr_any"]
+            any_background = over_any(one, cutout)["psnr_any"]
             assert any_background is not None
             errors["any"].append(10 ** (-any_background / 10))
-            for name, part in zip(SCORES[1:3], interior_and_band(truth.mask, params.band), strict=True):
+            for name, part in zip(SCORES[1:3], interior_and_band(truth.mask), strict=True):
                 weight = part * truth.mask
                 errors[name].append(float((weight * off).sum() / weight.sum()))
             film.add(frame, {"": picture}, truth.picture, truth.mask)

@@ -15,7 +15,7 @@ from facefolds_core.params.compress import (
     StreamParams,
     VideoCodec,
 )
-from facefolds_core.params.evaluate import EvaluateParams, ScoreWarningParams
+from facefolds_core.params.evaluate import EvaluateParams
 from facefolds_core.params.explicit import ExplicitParams, GeometryParams, ReflectionParams, StartParams
 from facefolds_core.params.export import (
     BakeParams,
@@ -53,7 +53,6 @@ __all__ = [
     "ReconstructParams",
     "ReflectionParams",
     "SampleParams",
-    "ScoreWarningParams",
     "Section",
     "StartParams",
     "StreamParams",

@@ -18,7 +18,7 @@ from facefolds_core.files.writing import atomic_folder, read_json, write_json
 from facefolds_core.model import load_model
 from facefolds_core.model.device import device_of
 from facefolds_core.packaging.notes import codec_warning
-from facefolds_core.params import EvaluateParams, ScoreWarningParams
+from facefolds_core.params import EvaluateParams
 from facefolds_core.scoring.evaluation import evaluate as score
 from facefolds_core.scoring.films import FILMS
 from facefolds_core.scoring.panels import Evaluation
@@ -29,11 +29,17 @@ from facefolds_core.scoring.temporal import Change
 from facefolds_core.scoring.terminal import result_lines, score_lines
 from facefolds_core.scoring.training_scores import bad_views, warnings_of
 
+LEAST_EXPLAINED = 0.2
+"""Share of the variance over time that an asset should explain."""
+LEAST_FRAMES = 8
+"""With fewer nothing is said of the change over time."""
+LEAST_CHANGE = 0.004
+"""RMS of the photos' change over time, colours in [0, 1], above which it is more than noise."""
+
 
 def noticed(folders: SubjectFolders, scene: Scene, asset: Asset, result: Evaluation) -> tuple[Fact, ...]:
     """What is not well with the capture, the training, the files and the scores."""
     codec = codec_warning(asset.manifest.full.quality)
-    limits = read_stage(EvaluateParams, folders.config).warnings
     return warnings_among(
         [
             *scene.left_out,
@@ -41,12 +47,12 @@ def noticed(folders: SubjectFolders, scene: Scene, asset: Asset, result: Evaluat
             *([codec] if codec else []),
             *([fact("matte_is_found")] if result.matte == "found" else []),
             *warnings_of(result.training),
-            *stands_still(result.changes.get("holdout", {}), scene.num_frames, limits),
+            *stands_still(result.changes.get("holdout", {}), scene.num_frames),
         ]
     )
 
 
-def stands_still(changes: Mapping[str, Change], frames: int, params: ScoreWarningParams) -> list[Fact]:
+def stands_still(changes: Mapping[str, Change], frames: int) -> list[Fact]:
     """A fact where little of what changes from frame to frame is shown.
 
     Args:
@@ -56,10 +62,10 @@ def stands_still(changes: Mapping[str, Change], frames: int, params: ScoreWarnin
     asset, model = changes.get("asset"), changes.get("model")
     if asset is None or model is None or asset.temporal is None or model.temporal is None:
         return []
-    moves = frames >= params.min_frames and (asset.truth_change or 0.0) >= params.min_change
-    if not moves or asset.temporal >= params.min_temporal:
+    moves = frames >= LEAST_FRAMES and (asset.truth_change or 0.0) >= LEAST_CHANGE
+    if not moves or asset.temporal >= LEAST_EXPLAINED:
         return []
-    return [fact("stands_still", asset=asset.temporal, model=model.temporal, under=params.min_temporal)]
+    return [fact("stands_still", asset=asset.temporal, model=model.temporal, under=LEAST_EXPLAINED)]
 
 
 def training_events(fit: Path) -> list[Fact]:

@@ -62,7 +62,7 @@ def evaluate(
     _check(scene, model, asset)
     scorer = _Scorer(scene, asset, params, perceptual)
     show = _Show(set(spread(range(scene.num_frames), params.sheet_frames)))
-    rolls = FilmFolder(films if params.films else None, scene.fps, params.film_crf)
+    rolls = FilmFolder(films if params.films else None, scene.fps)
     found, changes = [], {}
     with progress(total=len(scorer.keys), desc="evaluate", unit="image") as bar:
         for split in SCORED:
@@ -142,7 +142,7 @@ class _Scorer:
             frame, truth = self._scene.frame_ids[k], self._truths.at(index, k)
             _check_finite(renderings, camera.name, frame)
             pictures = {variant: shown(one.over(params.background)) for variant, one in renderings.items()}
-            values = score_renderings(renderings, pictures, truth, self.kind, params.band, self._perceptual)
+            values = score_renderings(renderings, pictures, truth, self.kind, self._perceptual)
             group = {variant: ImageScore(camera.name, frame, variant, values[variant], split) for variant in values}
             region = region_of(self.kind, truth, renderings)
             both = pictures["model"], pictures["asset"], group["model"], group["asset"]

@@ -21,6 +21,8 @@ from facefolds_core.files.writing import read_json
 from facefolds_core.scoring.metrics import Array
 
 FILMS = "films.json"
+CRF = 18
+"""Constant rate factor of libx264: smaller is finer."""
 NAME = re.compile(r"films/[0-9]+\.mp4")
 
 
@@ -62,9 +64,9 @@ def read_films(folder: Path) -> list[FilmFile]:
 class FilmRoll:
     """Writes one camera's film, picture by picture."""
 
-    def __init__(self, path: Path, fps: Fraction, crf: int) -> None:
+    def __init__(self, path: Path, fps: Fraction) -> None:
         self.frames: list[str] = []
-        self._path, self._fps, self._crf = path, fps, crf
+        self._path, self._fps = path, fps
         self._first: tuple[Array, Array] = (np.zeros((0, 0, 3)), np.zeros((0, 0, 3)))
         self._container: Any = None
         self._stream: Any = None
@@ -93,7 +95,7 @@ class FilmRoll:
 
     def _open(self, width: int, height: int) -> None:
         muxer = {"fflags": "bitexact", "movflags": "faststart"}
-        options = {"crf": str(self._crf), "x264-params": "chromaloc=1"}  # where rgb_to_yuv420 puts chroma: the centre
+        options = {"crf": str(CRF), "x264-params": "chromaloc=1"}  # where rgb_to_yuv420 puts chroma: the centre
         self._container = av.open(str(self._path), "w", format="mp4", options=muxer)
         self._stream = self._container.add_stream("libx264", rate=self._fps, options=options)
         self._stream.width, self._stream.height, self._stream.pix_fmt = width, height, "yuv420p"
@@ -112,12 +114,11 @@ class FilmFolder:
     Args:
         folder: of the evaluation; None writes nothing.
         fps: 0 for a scene of one frame, of which there is no film.
-        crf: of libx264.
     """
 
-    def __init__(self, folder: Path | None, fps: float, crf: int) -> None:
+    def __init__(self, folder: Path | None, fps: float) -> None:
         self._folder = folder if fps > 0 else None
-        self._fps, self._crf = Fraction(fps).limit_denominator(1001), crf
+        self._fps = Fraction(fps).limit_denominator(1001)
         self.files: list[FilmFile] = []
 
     @contextmanager
@@ -128,7 +129,7 @@ class FilmFolder:
             return
         (self._folder / "films").mkdir(exist_ok=True)
         name = f"films/{len(self.files):03d}.mp4"
-        roll = FilmRoll(self._folder / name, self._fps, self._crf)
+        roll = FilmRoll(self._folder / name, self._fps)
         try:
             yield roll
         finally:

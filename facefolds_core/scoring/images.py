@@ -27,7 +27,6 @@ def score_renderings(
     pictures: Mapping[str, Array],
     truth: Truth,
     kind: MatteKind,
-    band: float,
     perceptual: Perceptual,
 ) -> dict[str, Values]:
     """Every metric of every variant, `None` where it cannot be had.
@@ -36,20 +35,19 @@ def score_renderings(
         renderings: by variant, "model" among them: it is what `found` goes by.
         pictures: the same over the background colour, as they are shown.
         kind: which opacity says where the subject is.
-        band: pixels to both sides of the outline.
     """
     result = score_images(pictures, truth.picture, truth.mask, perceptual)
     cutout, region = cutout_of(kind, truth), region_of(kind, truth, renderings)
     found = {}
     if kind != "true" and region is not None:
         found = _measured(FOUND_METRICS, pictures, truth.picture, region, perceptual)
-    parts = None if truth.mask is None else interior_and_band(truth.mask, band)
+    parts = None if truth.mask is None else interior_and_band(truth.mask)
     for variant, one in renderings.items():
         values = result[variant]
         values |= found.get(variant, {})
         values["ssim_high"] = None if region is None else ssim_high(pictures[variant], truth.picture, region)
         if cutout is not None:
-            values |= over_any(one, cutout, band)
+            values |= over_any(one, cutout)
         over = None if truth.plate is None else shown(one.over(truth.plate))
         if over is not None:
             values |= {"psnr_over_plate": psnr(over, truth.picture), "ssim_over_plate": ssim(over, truth.picture)}
@@ -75,13 +73,13 @@ def cutout_of(kind: MatteKind, truth: Truth) -> Cutout | None:
     return None if opacity is None else Cutout.of(truth.picture, opacity, truth.plate)
 
 
-def over_any(one: Rendering, cutout: Cutout, band: float) -> Values:
+def over_any(one: Rendering, cutout: Cutout) -> Values:
     """Over black, white, grey and the plate; and how far opacity is off."""
     alpha = np.clip(one.alpha.astype(np.float64), 0, 1)
     error = squared_error(one.rgb, alpha, cutout)
     patch = worst_patch(error, cutout.opacity)
     any_background = {"psnr_any": decibels(float(error.mean())), "worst_patch": None if patch is None else patch.psnr}
-    return any_background | opacity_errors(alpha, cutout.opacity, band)
+    return any_background | opacity_errors(alpha, cutout.opacity)
 
 
 def _outline(image: Array, over: Array | None, truth: Array, mask: Array, interior: Region, edge: Region) -> Values:

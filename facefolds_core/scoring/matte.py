@@ -15,6 +15,8 @@ THOUSAND = 1000.0
 GRADIENT_SIGMA = 1.4
 """Pixels, of the Gaussian derivative (Rhemann et al. 2009)."""
 INSIDE = 0.5
+BAND = 4.0
+"""Pixels to both sides of the outline that are scored apart."""
 
 
 def matte_errors(alpha: Array, mask: Array) -> dict[str, float]:
@@ -39,7 +41,7 @@ def matte_errors(alpha: Array, mask: Array) -> dict[str, float]:
     }
 
 
-def interior_and_band(mask: Array, pixels: float) -> tuple[Region, Region]:
+def interior_and_band(mask: Array, pixels: float = BAND) -> tuple[Region, Region]:
     """Where a mask is left after erosion by a disc, and what lies between its erosion and its dilation.
 
     The frame's edge is no outline: a bust that it cuts is not eroded there.
@@ -59,14 +61,13 @@ def interior_and_band(mask: Array, pixels: float) -> tuple[Region, Region]:
     return interior, dilated & ~interior
 
 
-def opacity_errors(alpha: Array, mask: Array, pixels: float) -> dict[str, float | None]:
+def opacity_errors(alpha: Array, mask: Array) -> dict[str, float | None]:
     """Mean |alpha - m| inside the outline, along it and outside (`interior_and_band`); None where there is no pixel.
 
     Args:
         alpha, mask: (H, W) opacity in [0, 1], found and true.
-        pixels: to both sides of the outline.
     """
-    interior, band = interior_and_band(mask, pixels)
+    interior, band = interior_and_band(mask)
     parts = {"inside": interior, "edge": band, "outside": ~(interior | band)}
     error = np.abs(alpha - mask)
     return {f"opacity_{name}": float(error[part].mean()) if part.any() else None for name, part in parts.items()}

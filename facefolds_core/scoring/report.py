@@ -16,8 +16,8 @@ from facefolds_core.errors import UserError
 from facefolds_core.facts import Fact
 from facefolds_core.files.paths import SubjectFolders
 from facefolds_core.files.writing import atomic_file, read_json
-from facefolds_core.params import EvaluateParams
 from facefolds_core.scoring.backgrounds import WorstPatch
+from facefolds_core.scoring.matte import BAND
 from facefolds_core.scoring.panels import ALL_METRICS, FILM_METRICS, HEADLINES, LEAST, VARIANTS, Evaluation, ImageScore
 from facefolds_core.scoring.temporal import Change
 from facefolds_core.scoring.training_scores import TrainingView, bad_views, compared_by
@@ -61,7 +61,7 @@ def metrics_json(
         "subject": subject,
         "headline": headline(held),
         "matte": found.matte,
-        "band_pixels": EvaluateParams.band,
+        "band_pixels": BAND,
         **held,
         "worst_patch": _patch(found.patch),
         "training_views": _training(found.training),

@@ -43,4 +43,4 @@ def score(seen: Rendering, truth: Truth, params: EvaluateParams) -> dict[str, fl
         return values
     cutout = Cutout.of(truth.picture, truth.matte, truth.plate)
     values["psnr_any"] = decibels(float(squared_error(seen.rgb, alpha, cutout).mean()))
-    return values | opacity_errors(alpha, cutout.opacity, params.band)
+    return values | opacity_errors(alpha, cutout.opacity)

@@ -53,7 +53,7 @@ def write_seen(folders: SubjectFolders, masks: bool) -> None:
         mask = None if opacity is None else opacity.image(index, k)[..., 0] / 255.0
         both = found[frame, "model"], found[frame, "asset"]
         panels.append(Panel(scene.cameras[index].name, frame, truth, picture, picture, *both, mask))
-    rolls = FilmFolder(folders.evaluation, 30.0, 18)
+    rolls = FilmFolder(folders.evaluation, 30.0)
     with rolls.roll(scene.cameras[index].name) as roll:
         assert roll is not None
         for panel in panels:

@@ -108,14 +108,14 @@ def test_opacity_is_judged_where_it_is_wrong(part: str, where: float) -> None:
     y, x = np.mgrid[:SIZE, :SIZE] - (SIZE - 1) / 2
     wrong = np.abs(np.hypot(x, y) - where) < 1.5
     alpha = np.where(wrong, 1 - disc(), disc())
-    found = opacity_errors(alpha, disc(), 4.0)
+    found = opacity_errors(alpha, disc())
     assert {name for name, value in found.items() if value} == {f"opacity_{part}"}
 
 
 def test_an_outline_that_is_too_thin_shows_in_all_of_them() -> None:
     cut = Cutout(disc()[..., None] * skin(), disc(), plate())
-    same = over_any(Rendering(cut.colour.astype(np.float32), disc().astype(np.float32)), cut, 4.0)
+    same = over_any(Rendering(cut.colour.astype(np.float32), disc().astype(np.float32)), cut)
     thin = disc(0.9 * 16)
-    found = over_any(Rendering((thin[..., None] * skin()).astype(np.float32), thin.astype(np.float32)), cut, 4.0)
+    found = over_any(Rendering((thin[..., None] * skin()).astype(np.float32), thin.astype(np.float32)), cut)
     assert same["psnr_any"] > found["psnr_any"] + 20  # type: ignore[operator]
     assert found["opacity_edge"] > 0.1 > 1e-3 > same["opacity_edge"]  # type: ignore[operator]

@@ -23,7 +23,7 @@ def decoded(path: Path) -> list[np.ndarray]:
 def test_every_frame_comes_back_side_by_side(tmp_path: Path, size: tuple[int, int]) -> None:
     height, width = size
     greys = [0.2, 0.5, 0.8]
-    folder = FilmFolder(tmp_path, 30.0, 10)
+    folder = FilmFolder(tmp_path, 30.0)
     with folder.roll("a/b") as roll:
         assert roll is not None
         for k, grey in enumerate(greys):
@@ -39,7 +39,7 @@ def test_every_frame_comes_back_side_by_side(tmp_path: Path, size: tuple[int, in
 
 
 def test_a_single_frame_is_no_film(tmp_path: Path) -> None:
-    folder = FilmFolder(tmp_path, 30.0, 18)
+    folder = FilmFolder(tmp_path, 30.0)
     for camera in ("a@0", "a@1"):  # as a stabilised scene has them
         with folder.roll(camera) as roll:
             assert roll is not None
@@ -48,7 +48,7 @@ def test_a_single_frame_is_no_film(tmp_path: Path) -> None:
 
 
 def test_a_still_scene_has_none(tmp_path: Path) -> None:
-    folder = FilmFolder(tmp_path, 0.0, 18)
+    folder = FilmFolder(tmp_path, 0.0)
     with folder.roll("a") as roll:
         assert roll is None
     assert (folder.files, list(tmp_path.iterdir())) == ([], [])
@@ -59,7 +59,7 @@ def test_a_film_that_may_not_grow_is_named(tmp_path: Path) -> None:
         pytest.raises(OSError) as caught,
         limited_files(198),
         atomic_folder(tmp_path / "evaluation") as folder,
-        FilmFolder(folder, 30.0, 18).roll("a") as roll,
+        FilmFolder(folder, 30.0).roll("a") as roll,
     ):
         assert roll is not None
         for frame in ("0", "1"):

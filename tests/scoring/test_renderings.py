@@ -26,9 +26,9 @@ def rendering(alpha: np.ndarray, colour: np.ndarray = FACE) -> Rendering:
     return Rendering((alpha[..., None] * colour).astype(np.float32), alpha.astype(np.float32))
 
 
-def scores(asset: Rendering, truth: Truth = TRUTH, kind: MatteKind = "true", band: float = 3) -> Values:
+def scores(asset: Rendering, truth: Truth = TRUTH, kind: MatteKind = "true") -> Values:
     both, pictures = dict.fromkeys(("model", "asset"), asset), dict.fromkeys(("model", "asset"), shown(asset.rgb))
-    return score_renderings(both, pictures, truth, kind, band, Perceptual())["asset"]
+    return score_renderings(both, pictures, truth, kind, Perceptual())["asset"]
 
 
 def test_a_true_rendering_is_perfect_over_the_plate_and_poor_over_black() -> None:

@@ -8,7 +8,6 @@ import pytest
 
 from facefolds_core.facts import fact
 from facefolds_core.files.writing import write_json
-from facefolds_core.params import ScoreWarningParams
 from facefolds_core.pipeline.evaluate import stands_still, training_events, warnings_among
 from facefolds_core.scoring.temporal import Change
 
@@ -25,7 +24,7 @@ from facefolds_core.scoring.temporal import Change
 )
 def test_a_film_that_stands_still_is_named(explained: float | None, frames: int, moves: float, said: bool) -> None:
     change = Change(explained, 20.0, 0.01, moves)
-    found = stands_still({"model": change, "asset": change}, frames, ScoreWarningParams())
+    found = stands_still({"model": change, "asset": change}, frames)
     assert [one.kind for one in found] == (["stands_still"] if said else [])
     assert all("train.iterations" in str(one) for one in found)
 
