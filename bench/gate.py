@@ -27,11 +27,12 @@ from bench.run import Project, chosen, own_params
 from bench.tables import markdown, number
 from facefolds_core.asset import Asset, read_asset
 from facefolds_core.captures.actor import make_rig
+from facefolds_core.cli.render import far_enough
 from facefolds_core.errors import report_user_errors
 from facefolds_core.files.writing import atomic_folder, read_json
 from facefolds_core.params import STAGE_SECTIONS, CaptureParams
 from facefolds_core.rendering.areas import view_of
-from facefolds_core.rendering.camera_paths import Eye, camera_of, distance_to_fit
+from facefolds_core.rendering.camera_paths import Eye, camera_of
 from facefolds_core.spacing import spread
 
 KEPT = ROOT / "bench" / "results" / "gate.json"
@@ -79,8 +80,8 @@ def strip(
         size: width and height of a picture, pixels.
         field_of_view: degrees, of its shorter side.
     """
-    box, eyes = asset.manifest.bounds, [Eye(azimuth) for azimuth in azimuths]
-    away = 1.0 if box is None else max(1.0, distance_to_fit(box.min, box.max, eyes, *size, field_of_view))
+    eyes = [Eye(azimuth) for azimuth in azimuths]
+    away = far_enough(asset, eyes, *size, field_of_view)
     cameras = [camera_of(Eye(eye.azimuth, distance=away), *size, field_of_view) for eye in eyes]
     textures = asset.frame(0)
     seen = [view_of(asset.full, camera).composite(textures) for camera in cameras]

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from playwright.sync_api import Browser, CDPSession, sync_playwright
+from playwright.sync_api import Browser, CDPSession
 
 from bench.results import commit_name, machine_name, now
 from bench.tables import markdown
@@ -24,7 +24,7 @@ from facefolds_core.rendering.opengl import OpenGLRenderer
 from facefolds_core.rendering.pixels import finer, pixel_means
 from facefolds_core.serving.player import find_player
 from facefolds_core.serving.server import serving
-from tests.chromium import FLAGS, chromium
+from tests.chromium import headless
 from tests.pictures import GREY, GREY_VALUE, five_cameras, psnr
 from tests.viewer.captured import captured
 
@@ -151,11 +151,7 @@ def main(
         read_asset(asset)
         wanted = [float(text) or None for text in lines.split(",")]
         window = parse_size(size, film=False)
-        with (
-            serving(find_player(), {"asset": asset}) as address,
-            sync_playwright() as playwright,
-            playwright.chromium.launch(executable_path=chromium(), args=list(FLAGS)) as browser,
-        ):
+        with serving(find_player(), {"asset": asset}) as address, headless() as browser:
             rows = [measure(browser, address, line, window) for line in wanted]
             near = agreement(browser, address, asset)
         typer.echo(table(rows))

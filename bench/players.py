@@ -19,7 +19,7 @@ import numpy as np
 import trimesh
 import typer
 from numpy.typing import NDArray
-from playwright.sync_api import Browser, sync_playwright
+from playwright.sync_api import Browser
 from trimesh.sample import sample_surface
 
 from bench.results import ROOT, commit_name, machine_name, now
@@ -32,7 +32,7 @@ from facefolds_core.files.writing import write_json
 from facefolds_core.rendering.reference import sample_texture
 from facefolds_core.serving.player import find_player
 from facefolds_core.serving.server import serving
-from tests.chromium import FLAGS, chromium
+from tests.chromium import headless
 
 PAGES = ROOT / "bench" / "browser"
 PATIENCE = 300_000
@@ -197,10 +197,10 @@ def main(
         counts = [int(count) for count in splats.split(",") if count]
         rows, folders = prepare([read_asset(folder) for folder in assets], counts, place / "site" / "heads")
         wanted = [parse_size(text, film=False) for text in sizes.split(",")]
-        path, flags, found = chromium(), [*FLAGS, "--disable-gpu-vsync"], []
-        with serving(place / "site", folders) as address, sync_playwright() as playwright:
+        found = []
+        with serving(place / "site", folders) as address:
             for row in rows:
-                with playwright.chromium.launch(executable_path=path, args=flags) as browser:
+                with headless("--disable-gpu-vsync") as browser:
                     found.append(measure_row(browser, address, row, wanted, pictures))
                 typer.echo(f"players: {row['name']}: {found[-1]['timings'][0]['milliseconds']:.0f} ms")
         typer.echo(timing_table([t for entry in found for t in entry["timings"]]))

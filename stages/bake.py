@@ -1,4 +1,4 @@
-"""Texture frames fitted to the meshes that ship: data/<subject>/textures."""
+"""Texture frames that ship, held where a change would not show: data/<subject>/textures."""
 
 from __future__ import annotations
 

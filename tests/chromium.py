@@ -13,7 +13,7 @@ from typing import Any
 
 import psutil
 import pytest
-from playwright.sync_api import Browser, BrowserContext, Page, Playwright
+from playwright.sync_api import Browser, BrowserContext, Page, Playwright, sync_playwright
 
 from facefolds_core.errors import UserError
 
@@ -46,8 +46,9 @@ def find_browser() -> str | None:
     return None
 
 
-def chromium() -> str:
-    """Where the browser lies, for commands that need one.
+@contextmanager
+def headless(*flags: str) -> Iterator[Browser]:
+    """A browser for commands that need one.
 
     Raises:
         UserError: if there is none.
@@ -55,7 +56,11 @@ def chromium() -> str:
     path = find_browser()
     if path is None:
         raise UserError("no Chromium", expected=" or ".join(BROWSERS), remedy="apt-get install chromium")
-    return path
+    with (
+        sync_playwright() as playwright,
+        playwright.chromium.launch(executable_path=path, args=[*FLAGS, *flags]) as browser,
+    ):
+        yield browser
 
 
 class Chromium:

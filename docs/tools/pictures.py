@@ -9,8 +9,7 @@ player.jpg and sizes.jpg Chromium and the player that `make view` builds.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from fractions import Fraction
 from functools import partial
 from pathlib import Path
@@ -19,7 +18,7 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 import typer
 from PIL import Image
-from playwright.sync_api import Browser, sync_playwright
+from playwright.sync_api import Browser
 
 from bench.results import ROOT, commit_name
 from facefolds_core.asset import read_asset
@@ -36,7 +35,7 @@ from facefolds_core.rendering.pixels import SIDE, finer
 from facefolds_core.serving.player import find_player
 from facefolds_core.serving.server import serving
 from facefolds_core.spacing import spread
-from tests.chromium import FLAGS, chromium
+from tests.chromium import headless
 
 IMAGES = ROOT / "docs" / "images"
 RECORD = "made.json"
@@ -152,7 +151,7 @@ def page(subject: Path, out: Path) -> None:
     """
     if not (report := subject / "report.html").exists():
         raise UserError("no report", file=report, remedy=f"run `facefolds report {subject}` first")
-    with browser() as started:
+    with headless() as started:
         sizes = [(width, PAGE["height"]) for width in PAGE["widths"]]
         shots = [screen(started, report.resolve().as_uri(), size, PAGE["patience"]) for size in sizes]
     side_by_side(shots, PAGE["gap"], out, PAGE["quality"])
@@ -164,21 +163,12 @@ def player(options: dict[str, Any], subject: Path, out: Path) -> None:
     Raises:
         UserError: if there is no player, or no Chromium.
     """
-    with serving(find_player(), {"asset": subject / "asset"}) as address, browser() as started:
+    with serving(find_player(), {"asset": subject / "asset"}) as address, headless() as started:
         shots = [
             screen(started, f"{address}?src=asset/#level=full&{view}", size, options["patience"], FULL)
             for *size, view in options["panes"]
         ]
     side_by_side(shots, options["gap"], out, options["quality"], options["width"])
-
-
-@contextmanager
-def browser() -> Iterator[Browser]:
-    """Chromium, without a screen."""
-    with sync_playwright() as playwright:
-        started = playwright.chromium.launch(executable_path=chromium(), args=list(FLAGS))
-        yield started
-        started.close()
 
 
 def screen(started: Browser, address: str, size: Sequence[int], patience: int, there: str = "true") -> Image.Image:

@@ -6,8 +6,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from contextlib import nullcontext
-from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -17,30 +17,19 @@ from facefolds_core.errors import UserError
 from facefolds_core.model import RadianceManifolds
 from facefolds_core.params import EvaluateParams
 from facefolds_core.progress import progress
-from facefolds_core.scoring.backgrounds import Cutout, Rendering, WorstPatch, find_patch
-from facefolds_core.scoring.films import FilmFolder
+from facefolds_core.scoring.backgrounds import Rendering, WorstPatch, find_patch
+from facefolds_core.scoring.films import FilmFolder, FilmRoll
 from facefolds_core.scoring.images import cutout_of, region_of, score_renderings
-from facefolds_core.scoring.metrics import Array, shown
+from facefolds_core.scoring.metrics import shown
 from facefolds_core.scoring.model_view import PosedView
 from facefolds_core.scoring.panels import Evaluation, ImageScore, Panel
 from facefolds_core.scoring.perceptual import Perceptual
-from facefolds_core.scoring.temporal import Film, change_of
+from facefolds_core.scoring.temporal import Film, Sums, change_of
 from facefolds_core.scoring.training_views import training_views
-from facefolds_core.scoring.truths import Truths
+from facefolds_core.scoring.truths import Truth, Truths
 from facefolds_core.spacing import spread
 
 SCORED: tuple[Split, ...] = ("holdout", "validate")
-
-
-@dataclass(frozen=True)
-class _Shot:
-    """A scored picture, by variant; what the asset shows, and what it should, as far as that is known."""
-
-    panel: Panel
-    scores: list[ImageScore]
-    pictures: dict[str, Array]
-    asset: Rendering
-    truth: Cutout | None
 
 
 def evaluate(
@@ -61,62 +50,34 @@ def evaluate(
     """
     _check(scene, model, asset)
     scorer = _Scorer(scene, asset, params, perceptual)
-    show = _Show(set(spread(range(scene.num_frames), params.sheet_frames)))
     rolls = FilmFolder(films if params.films else None, scene.fps)
-    found, changes = [], {}
+    changes = {}
     with progress(total=len(scorer.keys), desc="evaluate", unit="image") as bar:
         for split in SCORED:
             sums = []
             for index in scene.indices(split):
-                film, view = Film(), PosedView(scene, model, asset, scene.cameras[index])
+                view = PosedView(scene, model, asset, scene.cameras[index])
                 filming = rolls.roll(scene.cameras[index].name) if split == "holdout" else nullcontext()
                 with filming as roll:
-                    for k, shot in scorer.shots(split, index, view):
-                        found += shot.scores
-                        if shot.panel.mask is not None:
-                            film.add(k, shot.pictures, shot.panel.truth, shot.panel.mask)
-                        if split == "holdout":
-                            show.add(k, shot)
-                        if roll is not None:
-                            roll.add(shot.panel.frame, shot.panel.truth, shot.panel.shown)
-                        bar.update()
-                sums.append(film.sums())
+                    sums.append(scorer.score(split, index, view, roll, bar))
             filmed = [each for each in sums if each]
             changes[split] = {name: change_of(each[name] for each in filmed) for name in (filmed[0] if filmed else ())}
-    if show.worst is None:
+    if scorer.worst is None:
         raise UserError(
             "no held-out camera has a photo: there is nothing to score on",
             file=scene.folder / "frames.arrow",
             remedy="hold out cameras with photos, under subjects.<name>.holdout in params.yaml",
         )
     return Evaluation(
-        scores=found,
-        panels=show.panels,
-        worst=show.worst,
-        patch=show.patch,
+        scores=scorer.scores,
+        panels=scorer.panels,
+        worst=scorer.worst,
+        patch=scorer.patch,
         training=training_views(scene, asset, params),
         matte=scorer.kind,
         changes=changes,
         films=rolls.files,
     )
-
-
-class _Show:
-    """What is kept of the held-out cameras' pictures: those of the contact sheet, the worst, and the worst patch."""
-
-    def __init__(self, on_sheet: set[int]) -> None:
-        self._on_sheet = on_sheet
-        self.panels: list[Panel] = []
-        self.worst: Panel | None = None
-        self.patch: WorstPatch | None = None
-
-    def add(self, frame: int, shot: _Shot) -> None:
-        panel, psnr = shot.panel, shot.panel.asset_score.values["worst_patch"]
-        self.worst = panel if self.worst is None else min(self.worst, panel, key=lambda one: one.rank)
-        if psnr is not None and (self.patch is None or psnr < self.patch.place.psnr):
-            self.patch = find_patch(panel.camera, panel.frame, shot.asset, shot.truth)
-        if frame in self._on_sheet:
-            self.panels.append(panel)
 
 
 class _Scorer:
@@ -125,30 +86,58 @@ class _Scorer:
     Attributes:
         keys: (camera, frame) of all photos that are scored, held-out cameras first.
         kind: which opacity says where the subject is in them.
+        scores, panels, worst, patch: see `Evaluation`; of what has been scored.
     """
 
     def __init__(self, scene: Scene, asset: Asset, params: EvaluateParams, perceptual: Perceptual) -> None:
         self._scene, self._asset, self._params, self._perceptual = scene, asset, params, perceptual
         self._truths = Truths(scene)
+        self._on_sheet = set(spread(range(scene.num_frames), params.sheet_frames))
         cameras = [index for split in SCORED for index in scene.indices(split)]
         self.keys = [(c, k) for c in cameras for k in range(scene.num_frames) if (c, k) in self._truths]
         self.kind = self._truths.matte_kind(self.keys)
+        self.scores: list[ImageScore] = []
+        self.panels: list[Panel] = []
+        self.worst: Panel | None = None
+        self.patch: WorstPatch | None = None
 
-    def shots(self, split: Split, index: int, view: PosedView) -> Iterator[tuple[int, _Shot]]:
-        """All frames of a camera that have a photo."""
-        camera, params = self._scene.cameras[index], self._params
+    def score(self, split: Split, index: int, view: PosedView, roll: FilmRoll | None, bar: Any) -> dict[str, Sums]:
+        """All frames of a camera that have a photo; returns what changes in them, by variant.
+
+        Args:
+            roll: that the camera is filmed on.
+            bar: of progress.
+        """
+        camera, background, film = self._scene.cameras[index], self._params.background, Film()
         frames = [k for c, k in self.keys if c == index]
         for k, renderings in rendered(view, self._asset, frames):
             frame, truth = self._scene.frame_ids[k], self._truths.at(index, k)
             _check_finite(renderings, camera.name, frame)
-            pictures = {variant: shown(one.over(params.background)) for variant, one in renderings.items()}
+            pictures = {variant: shown(one.over(background)) for variant, one in renderings.items()}
             values = score_renderings(renderings, pictures, truth, self.kind, self._perceptual)
             group = {variant: ImageScore(camera.name, frame, variant, values[variant], split) for variant in values}
+            self.scores += group.values()
             region = region_of(self.kind, truth, renderings)
             both = pictures["model"], pictures["asset"], group["model"], group["asset"]
             over = None if truth.plate is None else shown(renderings["asset"].over(truth.plate))
             panel = Panel(camera.name, frame, truth.picture, *both, region, over)
-            yield k, _Shot(panel, list(group.values()), pictures, renderings["asset"], cutout_of(self.kind, truth))
+            if region is not None:
+                film.add(k, pictures, truth.picture, region)
+            if split == "holdout":
+                self._keep(k, panel, renderings["asset"], truth)
+            if roll is not None:
+                roll.add(frame, truth.picture, panel.shown)
+            bar.update()
+        return film.sums()
+
+    def _keep(self, k: int, panel: Panel, asset: Rendering, truth: Truth) -> None:
+        """What is kept of a held-out camera's picture: on the contact sheet, as the worst, its worst patch."""
+        psnr = panel.asset_score.values["worst_patch"]
+        self.worst = panel if self.worst is None else min(self.worst, panel, key=lambda one: one.rank)
+        if psnr is not None and (self.patch is None or psnr < self.patch.place.psnr):
+            self.patch = find_patch(panel.camera, panel.frame, asset, cutout_of(self.kind, truth))
+        if k in self._on_sheet:
+            self.panels.append(panel)
 
 
 def rendered(view: PosedView, asset: Asset, frames: list[int]) -> Iterator[tuple[int, dict[str, Rendering]]]:

@@ -16,7 +16,6 @@ import numpy as np
 import typer
 from numpy.typing import NDArray
 from PIL import Image
-from playwright.sync_api import sync_playwright
 
 from facefolds_core.asset import read_asset
 from facefolds_core.asset.glb import write_glb
@@ -24,7 +23,7 @@ from facefolds_core.asset.reader import AssetLevel
 from facefolds_core.cli.render import pick_level
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.registry import EXPORTERS
-from tests.chromium import FLAGS, chromium
+from tests.chromium import headless
 from tests.engines import blender, godot
 from tests.pictures import GREY_VALUE, expected_pictures, five_cameras, psnr, turned_cameras
 from tests.viewer import gltf_viewers
@@ -60,10 +59,8 @@ def in_the_web(level: AssetLevel, cameras: list[Camera], place: Path, viewer: gl
     """The GLB of the first frame in a viewer of glTF."""
     write_glb(place / "a.glb", level, "head")
     gltf_viewers.build(place, viewer)
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=chromium(), args=list(FLAGS))
+    with headless() as browser:
         found = gltf_viewers.pictures(browser, place, place / "a.glb", cameras)
-        browser.close()
     return {(name, 0): picture for name, picture in found.items()}
 
 
