@@ -28,7 +28,9 @@ from facefolds_core.files.paths import SubjectFolders
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.rendering.pixels import render
 from facefolds_core.scoring.backgrounds import Cutout, squared_error, worst_patch
+from facefolds_core.scoring.images import cutout_of
 from facefolds_core.scoring.metrics import decibels
+from facefolds_core.scoring.truths import Truths
 from facefolds_core.spacing import spread
 from facefolds_core.subject import drawing
 from facefolds_core.subject.fit import fit_pictures
@@ -83,13 +85,8 @@ def _exact(rgb: NDArray[np.float32], alpha: NDArray[np.float32]) -> tuple[Array,
 
 def truths(scene: Scene, frames: list[int]) -> dict[tuple[int, int], Cutout]:
     """Of the held-out cameras."""
-    photos, masks, plates = scene.open_frames(), scene.open_masks(), scene.open_plates()
-    assert masks is not None and plates is not None
-    keys = [(index, frame) for index in scene.indices("holdout") for frame in frames]
-    return {
-        key: Cutout.of(photos.image(*key) / 255, masks.image(*key)[..., 0] / 255, plates.image(key[0], 0) / 255)
-        for key in keys
-    }
+    known, keys = Truths(scene), [(index, frame) for index in scene.indices("holdout") for frame in frames]
+    return {key: found for key in keys if (found := cutout_of("true", known.at(*key))) is not None}
 
 
 def scores(look: Look, scene: Scene, truth: dict[tuple[int, int], Cutout]) -> list[str]:

@@ -23,6 +23,7 @@ from facefolds_core.scoring.images import score_images
 from facefolds_core.scoring.metrics import shown
 from facefolds_core.scoring.model_view import ModelView
 from facefolds_core.scoring.perceptual import Perceptual
+from facefolds_core.scoring.truths import Truths
 from facefolds_core.system.processes import own_environment
 
 Sections = Mapping[str, Mapping[str, Any]]
@@ -106,7 +107,7 @@ def score_model(
         camera, frame, values by METRICS and SUBJECT_METRICS.
     """
     model = load_model(folder, device)
-    truths, masks, poses = scene.open_frames(), scene.open_masks(), scene.poses
+    truths, poses = Truths(scene), scene.poses
     variant = 1 if model.reflection_maps() is None else 0
     for index in scene.indices(scene.choice_split):
         view = None
@@ -114,7 +115,6 @@ def score_model(
             if (index, k) in truths:
                 turn = None if poses is None else poses.at(k)
                 view = ModelView(model, scene.camera_in_head(index, k), turn) if view is None or poses else view
-                mask = masks.image(index, k)[..., 0] / 255.0 if masks is not None and (index, k) in masks else None
-                picture = shown(view.render(time)[variant])
-                values = score_images({"": picture}, truths.image(index, k) / 255.0, mask, perceptual)[""]
+                truth, picture = truths.at(index, k), shown(view.render(time)[variant])
+                values = score_images({"": picture}, truth.picture, truth.mask, perceptual)[""]
                 yield scene.cameras[index].name, k, values

@@ -97,8 +97,9 @@ def view_of(camera: Camera) -> dict[str, Any]:
     return {"K": camera.K.tolist(), "w2c": camera.w2c.tolist(), **size}
 
 
-def _sphere_mesh(radius: float, resolution: int = 24) -> tuple[Array, NDArray[np.int32]]:
+def _sphere_mesh(radius: float) -> tuple[Array, NDArray[np.int32]]:
     """Front half of a sphere around c: vertices (V, 3) and faces (F, 3)."""
+    resolution = 24
     grid = np.linspace(-0.95, 0.95, resolution)
     uv = np.stack(np.meshgrid(grid, grid, indexing="ij"), -1).reshape(-1, 2)
     index = np.arange(resolution**2, dtype=np.int32).reshape(resolution, resolution)

@@ -23,9 +23,9 @@ SHOWN = {"text/html": "_repr_html_", "image/png": "_repr_png_", "image/jpeg": "_
 """Kind of output -> the method of an object that gives it; the first that is small enough is saved."""
 
 
-def read(path: Path = NOTEBOOK) -> dict[str, Any]:
+def read() -> dict[str, Any]:
     """The notebook as JSON (nbformat 4.5)."""
-    notebook: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    notebook: dict[str, Any] = json.loads(NOTEBOOK.read_text(encoding="utf-8"))
     return notebook
 
 

@@ -45,6 +45,11 @@ class Rendering:
     rgb: Image
     alpha: Image
 
+    @property
+    def opacity(self) -> Array:
+        """(H, W) in [0, 1]."""
+        return np.clip(self.alpha.astype(np.float64), 0, 1)
+
     def over(self, background: ArrayLike) -> Image:
         """(H, W, 3) over RGB in [0, 1], (3,) or (H, W, 3)."""
         behind: Image = (1 - self.alpha)[..., None] * np.asarray(background, np.float32)
@@ -149,8 +154,7 @@ def find_patch(camera: str, frame: str, asset: Rendering, truth: Cutout | None) 
     """The worst window of one picture; None where the subject's opacity is not known, or it is not there."""
     if truth is None:
         return None
-    alpha = np.clip(asset.alpha.astype(np.float64), 0, 1)
-    place = worst_patch(squared_error(asset.rgb, alpha, truth), truth.opacity)
+    place = worst_patch(squared_error(asset.rgb, asset.opacity, truth), truth.opacity)
     if place is None:
         return None
     more = round(AROUND * place.side)

@@ -52,8 +52,7 @@ def score_renderings(
         if over is not None:
             values |= {"psnr_over_plate": psnr(over, truth.picture), "ssim_over_plate": ssim(over, truth.picture)}
         if truth.mask is not None and parts is not None:
-            alpha = np.clip(one.alpha.astype(np.float64), 0, 1)
-            values |= matte_errors(alpha, truth.mask)
+            values |= matte_errors(one.opacity, truth.mask)
             values |= _outline(pictures[variant], over, truth.picture, truth.mask, *parts)
     return result
 
@@ -64,7 +63,7 @@ def region_of(kind: MatteKind, truth: Truth, renderings: Mapping[str, Rendering]
         return truth.mask
     if kind == "scene":
         return truth.matte
-    return np.clip(renderings["model"].alpha.astype(np.float64), 0, 1)
+    return renderings["model"].opacity
 
 
 def cutout_of(kind: MatteKind, truth: Truth) -> Cutout | None:
@@ -75,11 +74,10 @@ def cutout_of(kind: MatteKind, truth: Truth) -> Cutout | None:
 
 def over_any(one: Rendering, cutout: Cutout) -> Values:
     """Over black, white, grey and the plate; and how far opacity is off."""
-    alpha = np.clip(one.alpha.astype(np.float64), 0, 1)
-    error = squared_error(one.rgb, alpha, cutout)
+    error = squared_error(one.rgb, one.opacity, cutout)
     patch = worst_patch(error, cutout.opacity)
     any_background = {"psnr_any": decibels(float(error.mean())), "worst_patch": None if patch is None else patch.psnr}
-    return any_background | opacity_errors(alpha, cutout.opacity)
+    return any_background | opacity_errors(one.opacity, cutout.opacity)
 
 
 def _outline(image: Array, over: Array | None, truth: Array, mask: Array, interior: Region, edge: Region) -> Values:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from facefolds_core.asset import Asset
 from facefolds_core.captures.scene import Scene
 from facefolds_core.params import EvaluateParams
@@ -35,12 +33,11 @@ def training_views(scene: Scene, asset: Asset, params: EvaluateParams) -> list[T
 
 def score(seen: Rendering, truth: Truth, params: EvaluateParams) -> dict[str, float | None]:
     """METRICS, and the errors of opacity against the matte that training may use."""
-    alpha = np.clip(seen.alpha.astype(np.float64), 0, 1)
     plate = None if truth.plate is None else psnr(shown(seen.over(truth.plate)), truth.picture)
-    found = psnr(shown(seen.over(params.background)), truth.picture, alpha)
+    found = psnr(shown(seen.over(params.background)), truth.picture, seen.opacity)
     values: dict[str, float | None] = {"psnr_any": None, "psnr_over_plate": plate, "psnr_found": found}
     if truth.matte is None:
         return values
     cutout = Cutout.of(truth.picture, truth.matte, truth.plate)
-    values["psnr_any"] = decibels(float(squared_error(seen.rgb, alpha, cutout).mean()))
-    return values | opacity_errors(alpha, cutout.opacity)
+    values["psnr_any"] = decibels(float(squared_error(seen.rgb, seen.opacity, cutout).mean()))
+    return values | opacity_errors(seen.opacity, cutout.opacity)

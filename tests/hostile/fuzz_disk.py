@@ -63,14 +63,14 @@ class NoSmallDiskError(Exception):
 
 
 @contextmanager
-def small_disk(folder: Path, size: int = DISK) -> Iterator[Path]:
+def small_disk(folder: Path) -> Iterator[Path]:
     """A disk of its own for the block.
 
     Raises:
         NoSmallDiskError: without root, or in a container that forbids it.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    command = ["mount", "-t", "tmpfs", "-o", f"size={size}", "tmpfs", str(folder)]
+    command = ["mount", "-t", "tmpfs", "-o", f"size={DISK}", "tmpfs", str(folder)]
     if not sys.platform.startswith("linux") or subprocess.run(command, capture_output=True).returncode:
         raise NoSmallDiskError("no small disk can be mounted here: it needs root on Linux")
     try:

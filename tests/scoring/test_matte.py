@@ -8,9 +8,10 @@ import pytest
 from facefolds_core.scoring.matte import interior_and_band, matte_errors
 
 
-def square(left: int = 10, top: int = 10, side: int = 20, size: int = 40) -> np.ndarray:
-    mask = np.zeros((size, size))
-    mask[top : top + side, left : left + side] = 1
+def square(left: int = 10) -> np.ndarray:
+    """20 x 20 of 40 x 40 pixels."""
+    mask = np.zeros((40, 40))
+    mask[10:30, left : left + 20] = 1
     return mask
 
 
