@@ -51,16 +51,9 @@ class UserError(Exception):
         super().__init__(str(self))
 
     def __str__(self) -> str:
-        lines = [self.message]
-        fields = [
-            ("file", self.file),
-            ("place", self.place),
-            ("expected", self.expected),
-            ("found", self.found),
-            ("remedy", self.remedy),
-        ]
-        lines += [f"  {name + ':':<10}{value}" for name, value in fields if value is not None]
-        return "\n".join(lines)
+        fields = {name: getattr(self, name) for name in ("file", "place", "expected", "found", "remedy")}
+        lines = [f"  {name + ':':<10}{value}" for name, value in fields.items() if value is not None]
+        return "\n".join([self.message, *lines])
 
 
 _AGAIN = "and run the same command again; finished stages are kept"

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import re
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -18,6 +18,7 @@ from facefolds_core.errors import UserError
 MAX_DEPTH = 60
 MAX_NODES = 200_000
 MAX_INTEGER = 2**63 - 1
+_64_BITS = "numbers of at most 64 bits"
 _TOO_DEEP = f"at most {MAX_DEPTH} lists or objects inside one another"
 
 
@@ -39,20 +40,19 @@ def parse_json(text: str, file: str | Path, remedy: str) -> Any:
     Raises:
         UserError: if it is not JSON, or one of the things that the module's head lists.
     """
-
-    def refuse(message: str, found: object, expected: str) -> NoReturn:
-        raise UserError(message, file=file, expected=expected, found=found, remedy=remedy)
+    wrong = partial(UserError, file=file, remedy=remedy)
 
     def integer(digits: str) -> int:
         if len(digits) > 20 or abs(int(digits)) > MAX_INTEGER:
-            refuse("a number too large", brief(digits), "numbers of at most 64 bits")
+            raise wrong("a number too large", expected=_64_BITS, found=brief(digits))
         return int(digits)
 
     def no_key_twice(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
         value = dict(pairs)
         if len(value) < len(pairs):
             names = [name for name, _ in pairs]
-            refuse("a key given twice", next(brief(n) for n in names if names.count(n) > 1), "each key once")
+            twice = next(brief(name) for name in names if names.count(name) > 1)
+            raise wrong("a key given twice", expected="each key once", found=twice)
         return value
 
     try:
@@ -60,18 +60,12 @@ def parse_json(text: str, file: str | Path, remedy: str) -> Any:
         if depth_of(value) > MAX_DEPTH:
             raise RecursionError
     except json.JSONDecodeError as error:
-        raise UserError(
-            "garbled JSON",
-            file=file,
-            place=f"line {error.lineno}, column {error.colno}",
-            expected="valid JSON",
-            found=error.msg,
-            remedy=remedy,
-        ) from None
+        place = f"line {error.lineno}, column {error.colno}"
+        raise wrong("garbled JSON", place=place, expected="valid JSON", found=error.msg) from None
     except RecursionError:
-        raise UserError("nested too deeply", file=file, expected=_TOO_DEEP, remedy=remedy) from None
+        raise wrong("nested too deeply", expected=_TOO_DEEP) from None
     except MemoryError:
-        raise UserError("too large for the memory", file=file, expected="a smaller file", remedy=remedy) from None
+        raise wrong("too large for the memory", expected="a smaller file") from None
     return value
 
 
@@ -92,6 +86,7 @@ def parse_yaml(text: str, file: str | Path, remedy: str) -> Any:
     """
     import yaml  # here: what reads an asset needs parse_json only, and PyYAML comes with an extra
 
+    wrong = partial(UserError, file=file, remedy=remedy)
     try:
         loader = _yaml_loader()(text)
         node = loader.get_single_node()
@@ -103,22 +98,16 @@ def parse_yaml(text: str, file: str | Path, remedy: str) -> Any:
         mark = getattr(error, "problem_mark", None)
         place = None if mark is None else f"line {mark.line + 1}, column {mark.column + 1}"
         found = getattr(error, "problem", None) or brief(str(error), 300)
-        raise UserError(
-            "garbled YAML", file=file, place=place, expected="valid YAML", found=found, remedy="mend this line"
-        ) from None
+        remedy = "mend this line"
+        raise wrong("garbled YAML", place=place, expected="valid YAML", found=found, remedy=remedy) from None
     except RecursionError:
-        raise UserError("nested too deeply", file=file, expected=_TOO_DEEP, remedy=remedy) from None
+        raise wrong("nested too deeply", expected=_TOO_DEEP) from None
     except MemoryError:
-        raise UserError("too large for the memory", file=file, expected="a smaller file", remedy=remedy) from None
+        raise wrong("too large for the memory", expected="a smaller file") from None
     except (ValueError, TypeError, KeyError, AttributeError, OverflowError) as error:
         # What PyYAML's own constructors raise for `!!int x`, `!!bool x`, `!!timestamp x`, 2024-13-45, ...
-        raise UserError(
-            "a value that is not of its type",
-            file=file,
-            expected="a number, date or text as YAML writes them",
-            found=brief(str(error)),
-            remedy=remedy,
-        ) from None
+        expected = "a number, date or text as YAML writes them"
+        raise wrong("a value that is not of its type", expected=expected, found=brief(str(error))) from None
     _check_numbers(value, file, remedy)
     return value
 
@@ -189,5 +178,4 @@ def _check_numbers(value: Any, file: str | Path, remedy: str) -> None:
         elif isinstance(entry, (list, tuple, set)):
             inside += entry
         elif isinstance(entry, int) and abs(entry) > MAX_INTEGER:
-            expected = "numbers of at most 64 bits"
-            raise UserError("a number too large", file=file, expected=expected, found=brief(entry), remedy=remedy)
+            raise UserError("a number too large", file=file, expected=_64_BITS, found=brief(entry), remedy=remedy)
