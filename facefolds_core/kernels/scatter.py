@@ -38,11 +38,11 @@ def _add4(sums, i, j, v0, v1, v2, v3):  # type: ignore[no-untyped-def]
     sums[i, j, 3] = s3 + v3
 
 
-def put_of(values: int) -> Callable[[Any, Any, Any, Any], None]:
-    """A compiled function that adds what ray k wants of one layer to its sums (H, W, values), bilinear.
+def scatter_of(values: int) -> Callable[[Any, Any, Any], None]:
+    """A compiled function that adds what R rays want of one layer to its sums, bilinear.
 
-    Its arguments: the texel before the ray's crossing as row width + column; wish (R, 2 + values), fractions of row and
-    column and what is to be added; k; the sums.
+    Its arguments: index (R,), the texel before each ray's crossing as row width + column, or -1; wish (R, 2 + values),
+    fractions of row and column and what is to be added; the sums (H, W, values).
     """
 
     @inlined
@@ -72,20 +72,12 @@ def put_of(values: int) -> Callable[[Any, Any, Any, Any], None]:
         w = a * b
         _add4(sums, i + next_one, j + next_one, w * g0, w * g1, w * g2, w * g3)
 
-    return put4 if values == 4 else put
-
-
-def scatter_of(values: int) -> Callable[[Any, Any, Any], None]:
-    """A compiled function that puts what R rays want of one layer.
-
-    Its arguments: index (R,), the texel before each ray's crossing, or -1; wish and sums as of `put_of`.
-    """
-    put = put_of(values)
+    put_one = put4 if values == 4 else put
 
     @compiled
     def scatter(index: Any, wish: Any, sums: Any) -> None:
         for k in range(index.shape[0]):
             if index[k] >= 0:
-                put(index[k], wish, k, sums)
+                put_one(index[k], wish, k, sums)
 
     return scatter

@@ -350,29 +350,21 @@ def texture_positions(
     """(R, N, 2) uint16: s and t of the crossings over the window, as `hit_codes` has them."""
     codes = np.zeros((distance.shape[0], distance.shape[1], 2), np.uint16)
     for ray in prange(distance.shape[0]):
-        encode(ray, offsets, directions, distance, window, belt, bend, codes)
+        for n in range(distance.shape[1]):
+            d = distance[ray, n]
+            if d == 0.0:
+                continue
+            x, y, z = placed(
+                offsets[ray, 0] + d * directions[ray, 0],
+                offsets[ray, 1] + d * directions[ray, 1],
+                offsets[ray, 2] + d * directions[ray, 2],
+                bend,
+            )
+            u, v, _ = chart_position(x, y, z, belt)
+            row, column = _grid_position(u, v, window, 2, 2)
+            codes[ray, n, 0] = int(1.5 + SCALE * min(max(column, 0.0), 1.0))
+            codes[ray, n, 1] = int(1.5 + SCALE * min(max(row, 0.0), 1.0))
     return codes
-
-
-@compiled
-def encode(
-    ray: Any, offsets: Any, directions: Any, distance: Any, window: Any, belt: Any, bend: Any, codes: Any
-) -> None:
-    """`texture_positions` of one ray, into codes, which are 0."""
-    for n in range(distance.shape[1]):
-        d = distance[ray, n]
-        if d == 0.0:
-            continue
-        x, y, z = placed(
-            offsets[ray, 0] + d * directions[ray, 0],
-            offsets[ray, 1] + d * directions[ray, 1],
-            offsets[ray, 2] + d * directions[ray, 2],
-            bend,
-        )
-        u, v, _ = chart_position(x, y, z, belt)
-        row, column = _grid_position(u, v, window, 2, 2)
-        codes[ray, n, 0] = int(1.5 + SCALE * min(max(column, 0.0), 1.0))
-        codes[ray, n, 1] = int(1.5 + SCALE * min(max(row, 0.0), 1.0))
 
 
 @kernel(parallel=True)

@@ -1,7 +1,9 @@
 """Gaussians of a picture blended from front to back, tile by tile, and the gradients: compiled.
 
 A tile is one row of lanes wide (`lanes.py`). Each pair of a Gaussian and a tile is an *entry*; a Gaussian's entries are
-neighbours, so that its gradient is a sum over neighbours, whatever thread made them. Reference: `reference.py`."""
+neighbours, so that its gradient is a sum over neighbours, whatever thread made them.
+
+Reference: `tests/subject/reference.py`."""
 
 # numba has no types:
 # mypy: disable-error-code="no-untyped-def"

@@ -4,12 +4,11 @@ CPUs."""
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 from numba import prange
 
-from facefolds_core.kernels.jit import compiled, inlined, kernel
+from facefolds_core.kernels.jit import inlined, kernel
 from facefolds_core.subject.trilinear import sample
 
 CLEAR, OPAQUE = 1e-4, 1e-3
@@ -37,43 +36,26 @@ def render(origins, directions, grid, lower, voxel, step):  # type: ignore[no-un
     alpha = np.zeros(count, np.float32)
     depth = np.zeros(count, np.float32)
     for r in prange(count):
-        render_ray(r, origins, directions, grid, lower, voxel, step, rgb, alpha, depth)
+        o, d = origins[r], directions[r]
+        near, far = span(o, d, lower, voxel, grid)
+        t, red, green, blue = np.float32(1.0), np.float32(0.0), np.float32(0.0), np.float32(0.0)
+        s = near + 0.5 * step
+        while s < far and t >= OPAQUE:
+            x = (o[0] + s * d[0] - lower[0]) / voxel
+            y = (o[1] + s * d[1] - lower[1]) / voxel
+            z = (o[2] + s * d[2] - lower[2]) / voxel
+            v0, v1, v2, v3 = sample(grid, x, y, z)
+            a = np.float32(1 - math.exp(-v0 * step / voxel))
+            red += t * a * v1
+            green += t * a * v2
+            blue += t * a * v3
+            t *= 1 - a
+            if depth[r] == 0 and t < 0.5:
+                depth[r] = s
+            s += step
+        rgb[r, 0], rgb[r, 1], rgb[r, 2] = red, green, blue
+        alpha[r] = 1 - t
     return rgb, alpha, depth
-
-
-@compiled
-def render_ray(
-    r: Any,
-    origins: Any,
-    directions: Any,
-    grid: Any,
-    lower: Any,
-    voxel: Any,
-    step: Any,
-    rgb: Any,
-    alpha: Any,
-    depth: Any,
-) -> None:
-    """`render` of ray r into rgb, alpha and depth, which are 0."""
-    o, d = origins[r], directions[r]
-    near, far = span(o, d, lower, voxel, grid)
-    t, red, green, blue = np.float32(1.0), np.float32(0.0), np.float32(0.0), np.float32(0.0)
-    s = near + 0.5 * step
-    while s < far and t >= OPAQUE:
-        x = (o[0] + s * d[0] - lower[0]) / voxel
-        y = (o[1] + s * d[1] - lower[1]) / voxel
-        z = (o[2] + s * d[2] - lower[2]) / voxel
-        v0, v1, v2, v3 = sample(grid, x, y, z)
-        a = np.float32(1 - math.exp(-v0 * step / voxel))
-        red += t * a * v1
-        green += t * a * v2
-        blue += t * a * v3
-        t *= 1 - a
-        if depth[r] == 0 and t < 0.5:
-            depth[r] = s
-        s += step
-    rgb[r, 0], rgb[r, 1], rgb[r, 2] = red, green, blue
-    alpha[r] = 1 - t
 
 
 @kernel(parallel=True)

@@ -1,6 +1,6 @@
 """Gaussians onto a picture, and gradients back: the local affine approximation of Zwicker et al. 2001, compiled.
 
-Reference: `reference.py`."""
+Reference: `tests/subject/reference.py`."""
 
 # numba has no types:
 # mypy: disable-error-code="no-untyped-def"

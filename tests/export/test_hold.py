@@ -18,8 +18,8 @@ from facefolds_core.files.frame_store import FrameStore, write_frames
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.kernels.hit_codes import SCALE
 from facefolds_core.model.compositing import compositing_weights
-from facefolds_core.training.explicit.reference import look_up
 from tests.scenes import look_at_origin
+from tests.training.reference import look_up
 
 
 def kept(y: Sequence[float], price: float) -> np.ndarray:

@@ -6,10 +6,10 @@ import numba
 import numpy as np
 import torch
 
-from facefolds_core.subject import reference
 from facefolds_core.subject.drawing import differentiate, draw, view_of
 from facefolds_core.subject.splats import COLUMNS
 from tests.scenes import look_at_origin
+from tests.subject import reference
 from tests.subject.splats import some_splats
 from tests.threads import on_threads
 

@@ -10,11 +10,12 @@ from facefolds_core.geometry.sphere_uv import st_to_uv
 from facefolds_core.kernels import scatter
 from facefolds_core.kernels.adam import decays
 from facefolds_core.model.grids import GridTextures
-from facefolds_core.training.explicit import adam_kernel, reference, shading_kernel
+from facefolds_core.training.explicit import adam_kernel, shading_kernel
+from facefolds_core.training.explicit.adam_kernel import smooth
 from facefolds_core.training.explicit.rates import BETAS
-from facefolds_core.training.explicit.smoothing import smooth, smooth_reference
 from facefolds_core.training.explicit.state import MIN_ALPHA, MIN_LIGHT
 from tests.threads import on_threads
+from tests.training import reference
 
 WINDOW = (-0.5, 0.4, -0.3, 0.6)
 
@@ -161,7 +162,7 @@ def test_smoothing_matches_the_reference(shape: tuple[int, int]) -> None:
     given = values.copy()
     smoothed = smooth(values, *shape)
     np.testing.assert_array_equal(values, given)
-    np.testing.assert_allclose(smoothed, smooth_reference(torch.from_numpy(values), *shape).numpy(), atol=1e-6)
+    np.testing.assert_allclose(smoothed, reference.smooth(torch.from_numpy(values), *shape).numpy(), atol=1e-6)
 
 
 def test_smoothing_spreads_one_texel_over_nine() -> None:

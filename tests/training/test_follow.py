@@ -8,13 +8,14 @@ import torch
 from facefolds_core.kernels import hit_codes
 from facefolds_core.kernels.adam import decays
 from facefolds_core.params import ExplicitParams
-from facefolds_core.training.explicit import follow_kernel, reference, shading_kernel
+from facefolds_core.training.explicit import follow_kernel, shading_kernel
 from facefolds_core.training.explicit.follow import _apart, _met, follow, follow_frame, lagging, mean_errors
 from facefolds_core.training.explicit.rates import ALPHA_RATE, BETAS
 from facefolds_core.training.explicit.state import MIN_LIGHT, TextureState
 from facefolds_core.training.explicit.targets import ALL_COLOURS
 from facefolds_core.training.explicit.views import StillRays, Views
 from tests.threads import on_threads
+from tests.training import reference
 
 PARAMS = ExplicitParams()
 LAYERS, SHAPE, RAYS = 4, (9, 7), 600

@@ -16,7 +16,6 @@ from facefolds_core.geometry.chart import Chart
 from facefolds_core.geometry.sphere_uv import texel_uv, uv_to_directions
 from facefolds_core.model.reflection import Reflection, ReflectionShape
 from facefolds_core.params import ReflectionParams
-from facefolds_core.training.explicit import reference
 from facefolds_core.training.explicit.gloss import GlossFit
 from facefolds_core.training.explicit.reflection import (
     GlossParams,
@@ -37,6 +36,7 @@ from facefolds_core.training.explicit.reflection_maps import (
 )
 from facefolds_core.training.explicit.views import Views
 from tests.threads import on_threads
+from tests.training import reference
 from tests.training.test_explicit_kernels import random_cut
 
 WINDOW = (-0.5, 0.4, -0.3, 0.6)

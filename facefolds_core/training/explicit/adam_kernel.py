@@ -1,4 +1,6 @@
-"""Activation of the texture grids and their Adam step, compiled. Reference: `reference.py`."""
+"""Activation of the texture grids, their Adam step, and the smoothing of their opacity, compiled.
+
+Reference: `tests/training/reference.py`."""
 
 from __future__ import annotations
 
@@ -53,46 +55,60 @@ def adam_step(  # type: ignore[no-untyped-def]
     frame0, frame1, frame2 = frame_colour[0], frame_colour[1], frame_colour[2]
     fade0, fade1, fade2 = frame_alpha[0], frame_alpha[1], frame_alpha[2]
     for k in prange(layers.shape[1]):
-        static = (colour0, colour1, colour2), (layers0, layers1, layers2)
-        own = (frame0, frame1, frame2), (fade0, fade1, fade2)
-        adam_texel(k, static, own, texture, gradient, rates, correct, decay)
-
-
-@inlined  # a call with so many arrays costs
-def adam_texel(
-    k: Any, static: Any, own: Any, texture: Any, gradient: Any, rates: Any, correct: Any, decay: Any
-) -> None:
-    """`adam_step` of texel k; static and own are values and moments of its first four arguments."""
-    (colour0, colour1, colour2), (layers0, layers1, layers2) = static
-    (frame0, frame1, frame2), (fade0, fade1, fade2) = own
-    one = np.float32(1.0)
-    sum0 = np.float32(0.0)
-    sum1 = np.float32(0.0)
-    sum2 = np.float32(0.0)
-    met = False
-    # The clamp passes the gradient on: a colour at its border can come back.
-    for n in range(layers0.shape[1]):
-        g0, g1, g2, g3 = gradient[n, k, 0], gradient[n, k, 1], gradient[n, k, 2], gradient[n, k, 3]
-        if g0 == 0 and g1 == 0 and g2 == 0 and g3 == 0:
+        sum0, sum1, sum2 = np.float32(0.0), np.float32(0.0), np.float32(0.0)
+        met = False
+        # The clamp passes the gradient on: a colour at its border can come back.
+        for n in range(layers0.shape[1]):
+            g0, g1, g2, g3 = gradient[n, k, 0], gradient[n, k, 1], gradient[n, k, 2], gradient[n, k, 3]
+            if g0 == 0 and g1 == 0 and g2 == 0 and g3 == 0:
+                continue
+            for q in range(4):
+                gradient[n, k, q] = 0
+            met = True
+            sum0 += g0
+            sum1 += g1
+            sum2 += g2
+            for q in range(3):
+                g = g0 if q == 0 else (g1 if q == 1 else g2)
+                _adam(layers0, layers1, layers2, (k, n, q), g, rates[1], correct[0], correct[1], decay)
+            alpha = texture[k, n, 3]
+            g = g3 * alpha * (1 - alpha)
+            _adam(layers0, layers1, layers2, (k, n, 3), g, rates[2], correct[0], correct[1], decay)
+            layers0[k, n, 3] = min(max(layers0[k, n, 3], np.float32(-9.0)), np.float32(9.0))
+            _adam(fade0, fade1, fade2, (k, n), g, rates[4], correct[2], correct[3], decay)
+        if not met:
             continue
-        for q in range(4):
-            gradient[n, k, q] = 0
-        met = True
-        sum0 += g0
-        sum1 += g1
-        sum2 += g2
         for q in range(3):
-            g = g0 if q == 0 else (g1 if q == 1 else g2)
-            _adam(layers0, layers1, layers2, (k, n, q), g, rates[1], correct[0], correct[1], decay)
-        alpha = texture[k, n, 3]
-        g = g3 * alpha * (1 - alpha)
-        _adam(layers0, layers1, layers2, (k, n, 3), g, rates[2], correct[0], correct[1], decay)
-        layers0[k, n, 3] = min(max(layers0[k, n, 3], np.float32(-9.0)), np.float32(9.0))
-        _adam(fade0, fade1, fade2, (k, n), g, rates[4], correct[2], correct[3], decay)
-    if not met:
-        return
-    for q in range(3):
-        g = sum0 if q == 0 else (sum1 if q == 1 else sum2)
-        _adam(colour0, colour1, colour2, (k, q), g, rates[0], correct[0], correct[1], decay)
-        colour0[k, q] = min(max(colour0[k, q], np.float32(0.0)), one)
-        _adam(frame0, frame1, frame2, (k, q), g, rates[3], correct[2], correct[3], decay)
+            g = sum0 if q == 0 else (sum1 if q == 1 else sum2)
+            _adam(colour0, colour1, colour2, (k, q), g, rates[0], correct[0], correct[1], decay)
+            colour0[k, q] = min(max(colour0[k, q], np.float32(0.0)), np.float32(1.0))
+            _adam(frame0, frame1, frame2, (k, q), g, rates[3], correct[2], correct[3], decay)
+
+
+@kernel(parallel=True)
+def smooth(values, height, width):  # type: ignore[no-untyped-def]
+    """Mean over 3 x 3 texels, the outermost ones repeated beyond the border: the prior against opacity that only the
+    training cameras see.
+
+    Some thirty cameras do not determine the opacity of each texel of twelve layers by itself: left alone it becomes
+    grain that shows each camera its own picture.
+
+    Args:
+        values: (height width, N) float32.
+
+    Returns:
+        the same of the means.
+    """
+    out = np.empty_like(values)
+    layers = values.shape[1]
+    for i in prange(height):
+        sums = np.empty((width, layers), np.float32)  # of a texel, the one above, and the one below
+        for j in range(width):
+            above, below = max(i - 1, 0) * width + j, min(i + 1, height - 1) * width + j
+            for n in range(layers):
+                sums[j, n] = values[above, n] + values[i * width + j, n] + values[below, n]
+        for j in range(width):
+            left, right = max(j - 1, 0), min(j + 1, width - 1)
+            for n in range(layers):
+                out[i * width + j, n] = (sums[left, n] + sums[j, n] + sums[right, n]) * np.float32(1 / 9)
+    return out

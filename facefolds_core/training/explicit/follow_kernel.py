@@ -1,6 +1,6 @@
 """Steps on texels of one frame that do not follow what moves, and which rays show those, compiled.
 
-Reference: `reference.py`."""
+Reference: `tests/training/reference.py`."""
 
 from __future__ import annotations
 
@@ -63,42 +63,23 @@ def follow_step(  # type: ignore[no-untyped-def]
     decay,  # (4,) of `adam.decays`
 ):
     """Adam on what one frame adds at some texels, and nothing else."""
-    colours = colour_moments[0], colour_moments[1]
-    alphas = alpha_moments[0], alpha_moments[1]
+    colours0, colours1 = colour_moments[0], colour_moments[1]
+    alphas0, alphas1 = alpha_moments[0], alpha_moments[1]
     for q in prange(own.shape[0]):
-        _follow(q, own[q], frame_colour, frame_alpha, colours, alphas, texture, gradient, rates, correct, decay)
-        activate_texel(own[q], colour, layers, frame_colour, frame_alpha, texture)
+        k = own[q]
+        sum0, sum1, sum2 = np.float32(0.0), np.float32(0.0), np.float32(0.0)
+        for n in range(gradient.shape[0]):
+            sum0 += gradient[n, k, 0]
+            sum1 += gradient[n, k, 1]
+            sum2 += gradient[n, k, 2]
+            alpha = texture[k, n, 3]
+            g = gradient[n, k, 3] * alpha * (1 - alpha)
+            frame_alpha[k, n] -= adam(alphas0, alphas1, (q, n), g, rates[1], correct[0], correct[1], decay)
+        for c in range(3):
+            g = sum0 if c == 0 else (sum1 if c == 1 else sum2)
+            frame_colour[k, c] -= adam(colours0, colours1, (q, c), g, rates[0], correct[0], correct[1], decay)
+        activate_texel(k, colour, layers, frame_colour, frame_alpha, texture)
     for q in prange(near.shape[0]):
-        k = near[q]
         for n in range(gradient.shape[0]):
             for c in range(4):
-                gradient[n, k, c] = 0
-
-
-@compiled
-def _follow(
-    q: Any,
-    k: Any,
-    frame_colour: Any,
-    frame_alpha: Any,
-    colours: Any,
-    alphas: Any,
-    texture: Any,
-    gradient: Any,
-    rates: Any,
-    correct: Any,
-    decay: Any,
-) -> None:
-    """Texel k, number q of those that move."""
-    zero = np.float32(0.0)
-    sum0, sum1, sum2 = zero, zero, zero
-    for n in range(gradient.shape[0]):
-        sum0 += gradient[n, k, 0]
-        sum1 += gradient[n, k, 1]
-        sum2 += gradient[n, k, 2]
-        alpha = texture[k, n, 3]
-        g = gradient[n, k, 3] * alpha * (1 - alpha)
-        frame_alpha[k, n] -= adam(alphas[0], alphas[1], (q, n), g, rates[1], correct[0], correct[1], decay)
-    for c in range(3):
-        g = sum0 if c == 0 else (sum1 if c == 1 else sum2)
-        frame_colour[k, c] -= adam(colours[0], colours[1], (q, c), g, rates[0], correct[0], correct[1], decay)
+                gradient[n, near[q], c] = 0

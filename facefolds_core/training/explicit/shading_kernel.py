@@ -1,4 +1,4 @@
-"""Shading of stored crossings, forwards and backwards, compiled. Reference: `reference.py`.
+"""Shading of stored crossings, forwards and backwards, compiled. Reference: `tests/training/reference.py`.
 
 For how threads share the work see `facefolds_core.kernels.scatter`."""
 
@@ -131,71 +131,47 @@ def _shade(
     index: Any,
     wish: Any,
 ) -> Any:
-    """A block of R pixels, see `shade_pixel`. Returns the sum of |C - I|^2."""
-    layers, most = texture.shape[2], max(1, finer.shape[1])
-    met = np.empty((most, layers), np.int64), np.empty(most, np.int64)
-    own = (*met, np.empty((most, layers, 4), np.float32), np.empty((most, layers), np.float32))
+    """A block of R pixels: the texels before the crossings of their rays in index (N, R'), -1 where there is none, and
+    what is wanted there in wish (N, R', 6): fractions of row and column, gradient of rgba (`shares`: w (C - I), and w).
+    Returns the sum of |C - I|^2."""
+    layers, most, shares = texture.shape[2], max(1, finer.shape[1]), terms[2]
+    one, zero = np.float32(1.0), np.float32(0.0)
+    layer, count = np.empty((most, layers), np.int64), np.empty(most, np.int64)
+    c, before = np.empty((most, layers, 4), np.float32), np.empty((most, layers), np.float32)
     total, k = 0.0, 0
     for p in rays:
         through = codes[p : p + 1] if which[p] < 0 else finer[which[p]]
-        total += shade_pixel(k, p, through, camera, pixel, cut, behind, texture, shine, terms, index, wish, own)
-        k += through.shape[0]
+        samples = through.shape[0]
+        share = one / np.float32(samples)
+        light, r0, r1, r2 = zero, zero, zero, zero
+        for s in range(samples):
+            own = layer[s], c[s], before[s]
+            m, t, a0, a1, a2 = _meet(k + s, p, through[s], texture, shine, terms, index, wish, own)
+            count[s] = m
+            light, r0, r1, r2 = light + share * t, r0 + share * a0, r1 + share * a1, r2 + share * a2
+        cam, pix = camera[p], pixel[p]
+        d0, d1, d2 = difference(cut, behind, cam, pix, r0, r1, r2, light)
+        off = light - np.float32(255 - cut[cam, pix, 3]) * np.float32(1 / 255.0)
+        price = (zero if cut[cam, pix, 3] > 0 else np.float32(PRICE)) - behind[cam, 3] * off  # of opacity
+        price = zero if shares else price
+        factor = one if shares else share
+        for s in range(samples):
+            m, at, left = count[s], k + s, one
+            if m > 0:
+                left = before[s, m - 1] * (one - c[s, m - 1, 3])
+            s0, s1, s2 = behind[cam, 0], behind[cam, 1], behind[cam, 2]
+            # From the back: s is the colour of all that lies behind layer q.
+            for q in range(m - 1, -1, -1):
+                n, alpha, w = layer[s, q], c[s, q, 3], factor * before[s, q]
+                g0, g1, g2 = c[s, q, 0] - s0, c[s, q, 1] - s1, c[s, q, 2] - s2
+                wish[n, at, 2], wish[n, at, 3], wish[n, at, 4] = w * alpha * d0, w * alpha * d1, w * alpha * d2
+                wish[n, at, 5] = w * alpha if shares else w * (d0 * g0 + d1 * g1 + d2 * g2)
+                wish[n, at, 5] += factor * price * left / max(one - alpha, np.float32(CLEAREST))
+                s0, s1, s2 = s0 + alpha * g0, s1 + alpha * g1, s2 + alpha * g2
+        total += d0 * d0 + d1 * d1 + d2 * d2 + behind[cam, 3] * off * off
+        k += samples
     index[:, k:] = -1
     return total
-
-
-@inlined  # a call with so many arrays costs
-def shade_pixel(
-    k: Any,
-    p: Any,
-    codes: Any,
-    camera: Any,
-    pixel: Any,
-    cut: Any,
-    behind: Any,
-    texture: Any,
-    shine: Any,
-    terms: Any,
-    index: Any,
-    wish: Any,
-    own: Any,
-) -> Any:
-    """Pixel p of `shade`, with codes (S, N, 2) of its own rays, numbers k to k + S - 1 of their block: the texels
-    before their crossings in index (N, R), -1 where there is none, and what is wanted there in wish (N, R, 6):
-    fractions of row and column, gradient of rgba (`shares`: w (C - I), and w). Returns |C - I|^2.
-
-    Scratch: own, arrays (S, N) int64, (S,) int64, (S, N, 4) and (S, N).
-    """
-    samples, shares = codes.shape[0], terms[2]
-    one, zero = np.float32(1.0), np.float32(0.0)
-    layer, count, c, before = own
-    share = one / np.float32(samples)
-    light, r0, r1, r2 = zero, zero, zero, zero
-    for s in range(samples):
-        ray = layer[s], c[s], before[s]
-        m, t, a0, a1, a2 = _meet(k + s, p, codes[s], texture, shine, terms, index, wish, ray)
-        count[s] = m
-        light, r0, r1, r2 = light + share * t, r0 + share * a0, r1 + share * a1, r2 + share * a2
-    cam, pix = camera[p], pixel[p]
-    d0, d1, d2 = difference(cut, behind, cam, pix, r0, r1, r2, light)
-    off = light - np.float32(255 - cut[cam, pix, 3]) * np.float32(1 / 255.0)
-    price = (zero if cut[cam, pix, 3] > 0 else np.float32(PRICE)) - behind[cam, 3] * off  # of opacity
-    price = zero if shares else price
-    factor = one if shares else share
-    for s in range(samples):
-        m, at, through = count[s], k + s, one
-        if m > 0:
-            through = before[s, m - 1] * (one - c[s, m - 1, 3])
-        s0, s1, s2 = behind[cam, 0], behind[cam, 1], behind[cam, 2]
-        # From the back: s is the colour of all that lies behind layer q.
-        for q in range(m - 1, -1, -1):
-            n, alpha, w = layer[s, q], c[s, q, 3], factor * before[s, q]
-            g0, g1, g2 = c[s, q, 0] - s0, c[s, q, 1] - s1, c[s, q, 2] - s2
-            wish[n, at, 2], wish[n, at, 3], wish[n, at, 4] = w * alpha * d0, w * alpha * d1, w * alpha * d2
-            wish[n, at, 5] = w * alpha if shares else w * (d0 * g0 + d1 * g1 + d2 * g2)
-            wish[n, at, 5] += factor * price * through / max(one - alpha, np.float32(CLEAREST))
-            s0, s1, s2 = s0 + alpha * g0, s1 + alpha * g1, s2 + alpha * g2
-    return d0 * d0 + d1 * d1 + d2 * d2 + behind[cam, 3] * off * off
 
 
 @inlined

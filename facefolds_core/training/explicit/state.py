@@ -17,7 +17,6 @@ from facefolds_core.training.explicit import adam_kernel, shading_kernel
 from facefolds_core.training.explicit.clearing import loose
 from facefolds_core.training.explicit.rates import BETAS
 from facefolds_core.training.explicit.reflection_kernel import look
-from facefolds_core.training.explicit.smoothing import smooth
 from facefolds_core.training.explicit.targets import CutOuts
 from facefolds_core.training.explicit.views import Views
 
@@ -208,7 +207,7 @@ class TextureState:
         self._smooth(self.frame_alpha[0, frame])
 
     def _smooth(self, logits: Tensor) -> None:
-        logits.copy_(torch.from_numpy(smooth(np.ascontiguousarray(logits.numpy()), *self.shape)))
+        logits.copy_(torch.from_numpy(adam_kernel.smooth(np.ascontiguousarray(logits.numpy()), *self.shape)))
 
     def look(self, views: Views, pictures: CutOuts, frame: int, seen: NDArray[np.float32]) -> None:
         """Add what the rays show in one frame, without reflections, to `seen` (P, 6): see `reflection_kernel.look`."""

@@ -1,4 +1,4 @@
-"""The same as the compiled kernels, in plain torch: what they are tested against."""
+"""The same as the compiled kernels of `training.explicit`, in plain torch: what they are tested against."""
 
 from __future__ import annotations
 
@@ -170,3 +170,10 @@ def follow_step(
         values[own] = stacked[0]
         moments.copy_(stacked[1:])
     texture[own] = activate(static[0][own], static[1][own], frame_colour[own], frame_alpha[own])
+
+
+def smooth(values: Tensor, height: int, width: int) -> Tensor:
+    """As `adam_kernel.smooth`, of [height width, N]."""
+    image = values.reshape(height, width, -1).permute(2, 0, 1)[None]
+    padded = torch.nn.functional.pad(image, (1, 1, 1, 1), mode="replicate")
+    return torch.nn.functional.avg_pool2d(padded, 3, 1)[0].permute(1, 2, 0).reshape(values.shape)
