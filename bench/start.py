@@ -26,12 +26,13 @@ from facefolds_core.captures.scene import Scene, read_scene
 from facefolds_core.errors import report_user_errors
 from facefolds_core.scoring.matte import interior_and_band, matte_errors
 from facefolds_core.scoring.metrics import psnr
+from facefolds_core.subject.body import body_among
 from facefolds_core.subject.drawing import render
 from facefolds_core.subject.find import pictures_of
 from facefolds_core.subject.fit import fit_pictures
 from facefolds_core.subject.found import background
 from facefolds_core.subject.gaussians import GaussianParams
-from facefolds_core.subject.mattes import Mattes, body_among
+from facefolds_core.subject.mattes import Mattes
 from facefolds_core.subject.ply import write_ply
 from facefolds_core.subject.splats import Splats
 

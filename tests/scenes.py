@@ -107,6 +107,11 @@ def _sphere_mesh(radius: float) -> tuple[Array, NDArray[np.int32]]:
     return CENTRE + radius * uv_to_directions(uv), np.concatenate([np.stack([a, b, c], 1), np.stack([b, d, c], 1)])
 
 
+def cameras_alike(count: int) -> CameraFit:
+    """Nothing is known of any of them."""
+    return CameraFit(np.ones((count, 3)), np.full(count, np.nan))
+
+
 def gaussians(layers: tuple[SphereLayer, ...], count: int = 3000) -> Splats:
     """Flat Gaussians, evenly spread over the front halves of the spheres."""
     rows = []
@@ -171,8 +176,8 @@ def make_scene(
     write_frames(folder / "masks.arrow", (size, size, 1), opacities("holdout"))
     if mattes:
         write_frames(folder / "mattes.arrow", (size, size, 1), opacities("train"))
-        cameras_alike = CameraFit.alike(len(scene.indices("train")))
-        found = FoundSubject(gaussians(layers), 20.0, cameras_alike)  # of one colour: they explain little
+        alike = cameras_alike(len(scene.indices("train")))
+        found = FoundSubject(gaussians(layers), 20.0, alike)  # of one colour: they explain little
         write_found(folder / GAUSSIANS, found)
     if surface_radius is not None:
         vertices, faces = _sphere_mesh(surface_radius)

@@ -6,19 +6,6 @@ import torch
 from torch import Tensor
 
 
-def transmittances(alpha: Tensor) -> tuple[Tensor, Tensor]:
-    """What the layers before each layer let through, and what all do.
-
-    Args:
-        alpha: [..., N] straight opacity, outermost first.
-
-    Returns:
-        prod_{k<i} (1 - alpha_k) [..., N] and prod_k (1 - alpha_k) [...].
-    """
-    through = torch.cumprod(1 - alpha, -1)
-    return torch.cat([torch.ones_like(alpha[..., :1]), through[..., :-1]], -1), through[..., -1]
-
-
 def compositing_weights(alpha: Tensor) -> tuple[Tensor, Tensor]:
     """w_i = alpha_i prod_{k<i} (1 - alpha_k), and what is left for the background.
 
@@ -30,5 +17,6 @@ def compositing_weights(alpha: Tensor) -> tuple[Tensor, Tensor]:
     Returns:
         weights [..., N] and transmittance [...] = prod_k (1 - alpha_k); they add up to 1.
     """
-    before, behind = transmittances(alpha)
-    return alpha * before, behind
+    through = torch.cumprod(1 - alpha, -1)
+    before = torch.cat([torch.ones_like(alpha[..., :1]), through[..., :-1]], -1)
+    return alpha * before, through[..., -1]

@@ -83,22 +83,9 @@ def search_interval(
     return torch.where(valid, near, 0.0), torch.where(valid, far, 0.0), valid
 
 
-@dataclass(frozen=True)
-class Brackets:
-    """Pairs of neighbouring samples between which the field falls through a level; P pairs, in order of (ray, layer).
-
-    Attributes:
-        ray, layer: [P] indices.
-        near, far: [P] distances along the ray.
-        value_near, value_far: [P] field minus level there: >= 0 and < 0.
-    """
-
-    ray: Tensor
-    layer: Tensor
-    near: Tensor
-    far: Tensor
-    value_near: Tensor
-    value_far: Tensor
+Brackets = tuple[Tensor, Tensor, tuple[Tensor, Tensor, Tensor, Tensor]]
+"""P pairs of neighbouring samples between which the field falls through a level, in order of (ray, layer): [P] indices
+of ray and layer; then distances along the ray, near and far, and field minus level there, >= 0 and < 0."""
 
 
 @torch.no_grad()
@@ -125,21 +112,16 @@ def bracket_crossings(
     ray, layer = found.nonzero(as_tuple=True)
     j = first[ray, layer]
     level = levels[layer]
-    return Brackets(
-        ray=rays[ray],
-        layer=layer,
-        near=distance[ray, j],
-        far=distance[ray, j + 1],
-        value_near=values[ray, j] - level,
-        value_far=values[ray, j + 1] - level,
-    )
+    ends = distance[ray, j], distance[ray, j + 1], values[ray, j] - level, values[ray, j + 1] - level
+    return rays[ray], layer, ends
 
 
 def refine(field: Field, brackets: Brackets, levels: Tensor, origins: Tensor, directions: Tensor) -> Tensor:
     """Distances [P] of the crossings inside `brackets`, with the gradient of the field's parameters."""
-    o, d, level = origins[brackets.ray], directions[brackets.ray], levels[brackets.layer]
+    ray, layer, (nearest, farthest, value_near, value_far) = brackets
+    o, d, level = origins[ray], directions[ray], levels[layer]
     with torch.no_grad():
-        near, far, value_near, value_far = brackets.near, brackets.far, brackets.value_near, brackets.value_far
+        near, far = nearest, farthest
         distance = _secant(near, far, value_near, value_far)
         for _ in range(REFINEMENTS):
             value = field.value(o + distance[:, None] * d) - level
@@ -150,7 +132,7 @@ def refine(field: Field, brackets: Brackets, levels: Tensor, origins: Tensor, di
     value, slope = field.value_and_slope(o + distance[:, None] * d, d)
     # The field falls along the ray at an entry, so the slope is negative; it is bounded away from 0.
     step = (value - level) / slope.clamp(max=-MIN_SLOPE)
-    return (distance - step).clamp(min=brackets.near, max=brackets.far)
+    return (distance - step).clamp(min=nearest, max=farthest)
 
 
 def _secant(near: Tensor, far: Tensor, value_near: Tensor, value_far: Tensor) -> Tensor:
@@ -181,8 +163,8 @@ def first_crossings(
     brackets = bracket_crossings(field, levels, origins, directions, centre, radius, samples)
     found = refine(field, brackets, levels, origins, directions)
     hit = torch.zeros(shape, dtype=torch.bool, device=origins.device)
-    hit[brackets.ray, brackets.layer] = True
+    hit[brackets[:2]] = True
     distance = torch.zeros(shape, dtype=found.dtype, device=origins.device)
-    distance = distance.index_put((brackets.ray, brackets.layer), found)
+    distance = distance.index_put(brackets[:2], found)
     points = origins[:, None] + distance[..., None] * directions[:, None]
     return Crossings(points, distance, hit)

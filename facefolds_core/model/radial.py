@@ -100,7 +100,7 @@ class RadialManifolds(nn.Module):
         if torch.is_grad_enabled() or origins.device.type != "cpu":
             return self.reference_crossings(origins, directions)
         offsets = (origins - self.centre).double().numpy()
-        distance = torch.from_numpy(self.compiled_distances(offsets, directions.double().numpy()))
+        distance = torch.from_numpy(self.tracer()(offsets, directions.double().numpy(), None))
         points = origins[:, None] + distance[..., None] * directions[:, None]
         return Crossings(points, distance, distance > 0)
 
@@ -128,12 +128,9 @@ class RadialManifolds(nn.Module):
         offset = self.torso.offset - normal @ centre
         return np.array([*normal, offset, self.torso.band, *shift.rotation.ravel(), *moved, farthest])
 
-    def compiled_distances(self, offsets: np.ndarray, directions: np.ndarray) -> np.ndarray:
-        """(R, 3) float64 origins minus c, and directions -> (R, N) float32 distances, 0 where missed."""
-        return self.tracer()(offsets, directions, None)
-
     def tracer(self) -> Callable[[np.ndarray, np.ndarray, np.ndarray | None], np.ndarray]:
-        """`compiled_distances` with the surfaces as they are now, prepared for many calls; last comes a `bend`."""
+        """A function, prepared for many calls, with the surfaces as they are now: (R, 3) float64 origins minus c,
+        directions (R, 3) and a `bend` -> (R, N) float32 distances, 0 where missed."""
         rho = self.radii().detach().cpu().numpy()
         window, belt, bound = np.array(self.window), self.chart.numbers, self.radius
         if self._prepared is None or not np.array_equal(self._prepared[0], rho, equal_nan=True):

@@ -84,11 +84,6 @@ class CameraFit:
     errors: Gains
 
     @classmethod
-    def alike(cls, count: int) -> CameraFit:
-        """Nothing known yet: all cameras alike."""
-        return cls(np.ones((count, 3)), np.full(count, np.nan))
-
-    @classmethod
     def of(cls, shown: Array, alpha: Array, seen: Array, camera: NDArray[np.int32], count: int) -> CameraFit:
         """Args: see `camera_gains`."""
         gains = camera_gains(shown, alpha, seen, camera, count)

@@ -13,13 +13,29 @@ from scipy import ndimage
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.subject.closed_form import closed_form
 from facefolds_core.subject.found import DOUBT
-from facefolds_core.subject.known_background import TINY, PlateParams, opacity_before
+from facefolds_core.subject.known_background import NOISE, TINY, opacity_before
 
 Array = NDArray[np.float32]
 Image = NDArray[np.uint8]
 Bool = NDArray[np.bool_]
 
-
+INSIDE, OUTSIDE = 0.9, 0.3
+"""Opacities of the Gaussians above and below which they are believed,"""
+BAND = 2.0
+"""and so many pixels off from where they are neither, at a picture of 384 pixels."""
+ALIKE = 0.02
+"""Where a picture, blurred by `BAND`, differs by less from what stands behind, of values in [0, 1], Gaussians are not
+sure (`INSIDE`) when it votes."""
+SOFT, EMPTY = 5.0, 0.1
+"""Pixels on both sides of an outline in which opacity is not 0 or 1, at a picture of 384 pixels; twice as many where
+the Gaussians are neither opaque (`INSIDE`) nor of less opacity than the second."""
+BELIEVED = 1.0
+"""What the colour of what stands behind says of a pixel's opacity weighs so much where it is known exactly, beside the
+differences from its neighbours' in the closed form."""
+BESIDE = 6.0
+"""Pixels beside the subject by which that is told, standard deviation, at a picture of 384 pixels."""
+MOST_NOISE = 0.1
+"""Largest deviation of what stands behind that is reckoned with, of values in [0, 1]."""
 DARK = 8.0
 """Values of 255 from which on GrabCut sees differences by their share: dark hair before a dark room differs by few."""
 
@@ -31,46 +47,6 @@ SAMPLES = 3000
 """Pixels of each picture, of the subject and of what stands behind, by which their colours are known."""
 
 LOGARITHM = np.rint(255 * np.log1p(np.arange(256) / DARK) / np.log1p(255 / DARK)).astype(np.uint8)
-
-
-@dataclass(frozen=True)
-class EdgeParams:
-    """How an outline is found in a picture.
-
-    Attributes:
-        inside, outside: opacities of the Gaussians above and below which they are believed;
-        band: and so many pixels off from where they are neither, at a picture of 384 pixels;
-        grow: the silhouettes that vote are larger by so many, so that what GrabCut takes away once is not lost.
-        alike: where a picture, blurred by `band`, differs by less from what stands behind, of values in [0, 1],
-            Gaussians are not sure (`inside`) when it votes.
-        share: of the pictures that see a Gaussian and take it for the subject's, at least.
-        rounds: how often pictures and Gaussians tell each other.
-        soft: pixels on both sides of an outline in which opacity is not 0 or 1, at a picture of 384 pixels; twice as
-            many where the Gaussians are neither opaque (`inside`) nor:
-        empty: of less opacity than this.
-        believed: what the colour of what stands behind says of a pixel's opacity weighs so much where it is known
-            exactly, beside the differences from its neighbours' in the closed form.
-        beside: pixels beside the subject by which that is told, standard deviation, at a picture of 384 pixels.
-        noise: largest deviation of what stands behind that is reckoned with, of values in [0, 1].
-        asked: IoU of a silhouette with the Gaussians', under which the picture is asked once more, with those of the
-            subject alone, and in the frame of the Gaussians not believed: they show that very moment.
-        agreeing: the same, under which no frame's is believed.
-    """
-
-    inside: float = 0.9
-    outside: float = 0.3
-    band: float = 2.0
-    grow: float = 4.0
-    alike: float = 0.02
-    share: float = 0.6
-    rounds: int = 2
-    soft: float = 5.0
-    empty: float = 0.1
-    believed: float = 1.0
-    beside: float = 6.0
-    noise: float = 0.1
-    asked: float = 0.8
-    agreeing: float = 0.65
 
 
 @dataclass(frozen=True)
@@ -88,12 +64,12 @@ class Colours:
     subject: NDArray[np.float64]
 
 
-def colours_of(seen: Iterable[tuple[Image, Array, Camera]], edge: EdgeParams) -> Colours | None:
+def colours_of(seen: Iterable[tuple[Image, Array, Camera]]) -> Colours | None:
     """Of pictures (H, W, 3), with the opacity (H, W) of the subject's Gaussians in each; None where no pixel is surely
     the subject's, or none is surely not."""
     rows, labels, random = list[Image](), list[int](), np.random.default_rng(0)
     for picture, start, camera in seen:
-        inside, near = _sure(start, camera, edge)
+        inside, near = _sure(start, camera)
         image = _logarithmic(picture)
         for chosen, label in ((inside, cv2.GC_FGD), (~near, cv2.GC_BGD)):
             if chosen.any():
@@ -107,18 +83,18 @@ def colours_of(seen: Iterable[tuple[Image, Array, Camera]], edge: EdgeParams) ->
     return Colours(*models)
 
 
-def doubted(picture: Image, start: Array, behind: Array, camera: Camera, edge: EdgeParams) -> Array:
+def doubted(picture: Image, start: Array, behind: Array, camera: Camera) -> Array:
     """(H, W) opacity of the subject's Gaussians, nowhere sure where a picture (H, W, 3) looks like what stands behind.
 
     Args:
         start: (H, W) as they say.
         behind: (H, W, 3) what stands behind them.
     """
-    differs = _near((picture / 255 - np.clip(behind, 0, 1)).astype(np.float32), pixels(edge.band, camera))
-    return np.where(np.abs(differs).max(-1) < edge.alike, np.minimum(start, DOUBT), start)
+    differs = _near((picture / 255 - np.clip(behind, 0, 1)).astype(np.float32), pixels(BAND, camera))
+    return np.where(np.abs(differs).max(-1) < ALIKE, np.minimum(start, DOUBT), start)
 
 
-def cut_out(picture: Image, start: Array, camera: Camera, colours: Colours | None, edge: EdgeParams) -> Bool:
+def cut_out(picture: Image, start: Array, camera: Camera, colours: Colours | None) -> Bool:
     """(H, W) silhouette of the subject in a picture (H, W, 3): GrabCut (Rother et al. 2004) between what is surely its
     and surely not, without holes.
 
@@ -126,7 +102,7 @@ def cut_out(picture: Image, start: Array, camera: Camera, colours: Colours | Non
         start: (H, W) opacity of its Gaussians.
         colours: of `colours_of`.
     """
-    inside, near = _sure(start, camera, edge)
+    inside, near = _sure(start, camera)
     labels = np.where(start > 0.5, cv2.GC_PR_FGD, cv2.GC_PR_BGD).astype(np.uint8)
     labels[inside], labels[~near] = cv2.GC_FGD, cv2.GC_BGD
     cut = start > 0.5
@@ -152,11 +128,11 @@ def filled(cut: Bool, opacity: Array | None) -> Bool:
     return np.asarray(cut | (whole & ~(ndimage.binary_fill_holes(solid) & ~solid)))
 
 
-def _sure(start: Array, camera: Camera, edge: EdgeParams) -> tuple[Bool, Bool]:
+def _sure(start: Array, camera: Camera) -> tuple[Bool, Bool]:
     """(H, W) what is surely the subject, and what may be."""
-    radius = pixels(edge.band, camera)
-    inside = grown((start < edge.inside).astype(np.uint8), radius) == 0
-    return inside, grown((start > edge.outside).astype(np.uint8), radius) > 0
+    radius = pixels(BAND, camera)
+    inside = grown((start < INSIDE).astype(np.uint8), radius) == 0
+    return inside, grown((start > OUTSIDE).astype(np.uint8), radius) > 0
 
 
 def _logarithmic(picture: Image) -> Image:
@@ -164,7 +140,7 @@ def _logarithmic(picture: Image) -> Image:
     return np.asarray(cv2.LUT(np.ascontiguousarray(picture[..., ::-1]), LOGARITHM), np.uint8)
 
 
-def softened(picture: Image, cut: Bool, start: Array, behind: Array, camera: Camera, edge: EdgeParams) -> Array:
+def softened(picture: Image, cut: Bool, start: Array, behind: Array, camera: Camera) -> Array:
     """(H, W) opacity in [0, 1] of the subject in a picture (H, W, 3): 1 and 0 away from its outline; along it by the
     closed form of Levin et al. (2008, "A Closed-Form Solution to Natural Image Matting", eq. 12), where within
     3 x 3 pixels colours lie on a line between the subject's and the room's. Where it is known what stands behind, what
@@ -174,22 +150,22 @@ def softened(picture: Image, cut: Bool, start: Array, behind: Array, camera: Cam
         start: (H, W) opacity of its Gaussians.
         behind: (H, W, 3) what stands behind them.
     """
-    outside, own, radius = (~cut).astype(np.uint8), cut.astype(np.uint8), pixels(edge.soft, camera)
-    inside = (grown(outside, 2 * radius) == 0) | ((grown(outside, radius) == 0) & (start >= edge.inside))
-    empty = (grown(own, 2 * radius) == 0) | ((grown(own, radius) == 0) & (start <= edge.empty))
+    outside, own, radius = (~cut).astype(np.uint8), cut.astype(np.uint8), pixels(SOFT, camera)
+    inside = (grown(outside, 2 * radius) == 0) | ((grown(outside, radius) == 0) & (start >= INSIDE))
+    empty = (grown(own, 2 * radius) == 0) | ((grown(own, radius) == 0) & (start <= EMPTY))
     if not inside.any() or not empty.any():
         return cut.astype(np.float32)
     part, opacity = around(~empty, AROUND * radius), np.zeros(cut.shape, np.float32)
     colours, room = picture[part].astype(np.float32) / np.float32(255), np.clip(behind[part], 0, 1)
-    noise = _noise(colours, room, grown(own[part], 2 * radius) == 0, pixels(edge.beside, camera), radius, edge.noise)
+    noise = _noise(colours, room, grown(own[part], 2 * radius) == 0, pixels(BESIDE, camera), radius)
     unknown = ~(inside | empty)[part]
-    before = opacity_before(colours, room, inside[part], unknown, noise, PlateParams())
-    believed = edge.believed * (PlateParams().noise / noise) ** 4
+    before = opacity_before(colours, room, inside[part], unknown, noise)
+    believed = BELIEVED * (NOISE / noise) ** 4
     opacity[part] = closed_form(colours, inside[part], unknown, before, believed)
     return opacity
 
 
-def _noise(colours: Array, room: Array, far: Bool, beside: int, radius: int, most: float) -> Array:
+def _noise(colours: Array, room: Array, far: Bool, beside: int, radius: int) -> Array:
     """(H, W) how well it is known what stands behind, as a deviation: how much the picture varies beside the subject,
     and how far what is said to stand behind is off its mean there. Hidden by the subject from most cameras, that is a
     guess.
@@ -198,7 +174,6 @@ def _noise(colours: Array, room: Array, far: Bool, beside: int, radius: int, mos
         colours, room: (H, W, 3) of the picture, and said to stand behind.
         far: (H, W) surely not the subject.
         beside, radius: deviations of the surroundings, pixels: of what is beside, of what is behind.
-        most: deviation where nothing is known.
     """
     weight = _near(far.astype(np.float32), beside)
     nearest = ndimage.distance_transform_edt(weight <= TINY, return_distances=False, return_indices=True)
@@ -208,7 +183,7 @@ def _noise(colours: Array, room: Array, far: Bool, beside: int, radius: int, mos
     )
     off = _near(np.abs(room - mean), radius)
     variance = np.maximum(square - mean**2, 0).mean(-1) + np.square(off).mean(-1)
-    return np.asarray(np.clip(np.sqrt(variance), PlateParams().noise, most), np.float32)
+    return np.asarray(np.clip(np.sqrt(variance), NOISE, MOST_NOISE), np.float32)
 
 
 def _near(values: Array, width: float) -> Array:

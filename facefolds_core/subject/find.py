@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from facefolds_core.captures.cutout import cut_from
 from facefolds_core.captures.found_scene import GAUSSIANS, MATTES
 from facefolds_core.captures.scene import Scene
 from facefolds_core.errors import UserError
@@ -20,13 +19,15 @@ from facefolds_core.files.writing import atomic_folder
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.params import SubjectParams
 from facefolds_core.spacing import spread
+from facefolds_core.subject.body import body_among
 from facefolds_core.subject.cameras import CameraFit
+from facefolds_core.subject.cut_out import Image
 from facefolds_core.subject.drawing import draw, view_of
 from facefolds_core.subject.fit import fit_pictures
 from facefolds_core.subject.foreign import read_start
-from facefolds_core.subject.found import joined, reference_frame
+from facefolds_core.subject.found import joined, no_subject, reference_frame
 from facefolds_core.subject.gaussians import GaussianParams
-from facefolds_core.subject.mattes import Image, Key, Mattes, body_among
+from facefolds_core.subject.mattes import Key, Mattes
 from facefolds_core.subject.splats import Splats
 from facefolds_core.subject.storage import BODY, Body, FoundSubject, read_body, read_found, write_found
 
@@ -43,13 +44,11 @@ class View:
     """A training picture and the subject in it.
 
     Attributes:
-        camera: position among the training cameras.
         key: of the picture.
         colours: (H, W, 3) times opacity.
         opacity: (H, W).
     """
 
-    camera: int
     key: Key
     colours: Array
     opacity: Array
@@ -87,12 +86,12 @@ def find_subject(
     if start is not None or not all(mattes.known(key) for key in store if key[0] in training):
         mattes = Mattes(scene, named, _body(scene, how, params.seed, start))
         begun = mattes.begun()
-    views = [view_cut_out(scene, mattes, key) for key in _agreeing(scene, mattes, keys)]
+    views = _views(scene, mattes, keys)
     if not any((view.opacity > 0.5).any() for view in views):
         raise _nothing(scene)
     if start is None:
         mattes.alone = _fit_alone(scene, views, how, params.seed, begun)
-        views = [view_cut_out(scene, mattes, key) for key in _agreeing(scene, mattes, keys)]
+        views = _views(scene, mattes, keys)
         splats = _fit_alone(scene, views, how, params.seed, mattes.alone)
     else:
         assert begun is not None
@@ -118,9 +117,9 @@ def _fit_alone(scene: Scene, views: Sequence[View], how: GaussianParams, seed: i
     return splats.part(joined(splats, scene))
 
 
-def fit_room(scene: Scene, frame: int, params: GaussianParams | None = None, seed: int = 0) -> Splats:
+def fit_room(scene: Scene, frame: int, params: GaussianParams, seed: int = 0) -> Splats:
     """Gaussians of the training pictures of one frame, room included."""
-    return fit_pictures(*pictures_of(scene, frame, scene.indices("train")), params or GaussianParams(), seed)
+    return fit_pictures(*pictures_of(scene, frame, scene.indices("train")), params, seed)
 
 
 def pictures_of(scene: Scene, frame: int, cameras: Sequence[int]) -> tuple[list[Camera], list[Array]]:
@@ -139,30 +138,24 @@ def gaussian_params(params: SubjectParams, scene: Scene) -> GaussianParams:
     return found if scene.radius is None else replace(found, ball=scene.radius)
 
 
-def view_cut_out(scene: Scene, mattes: Mattes, key: Key) -> View:
-    """A training picture with the subject cut out of it."""
-    matte = mattes.of(key)
-    opacity = matte.opacity.astype(np.float32) / np.float32(255)
-    picture = scene.open_frames().image(*key).astype(np.float32) / np.float32(255)
-    plates, plate = scene.open_plates(), None
-    if plates is not None and (key[0], 0) in plates:
-        plate = plates.image(key[0], 0).astype(np.float32) / np.float32(255)
-    colours = np.asarray(cut_from(picture, opacity, plate), np.float32)
-    return View(scene.indices("train").index(key[0]), key, colours, opacity)
+def _views(scene: Scene, mattes: Mattes, keys: Sequence[Key]) -> list[View]:
+    """Training pictures that agree, with the subject cut out of them."""
+    return [View(key, *mattes.cut(key, mattes.of(key))) for key in _agreeing(scene, mattes, keys)]
 
 
 def judged(scene: Scene, splats: Splats, views: Sequence[View]) -> tuple[CameraFit, float]:
     """What single cameras do differently, and PSNR over the pictures, dB."""
-    parts, squares = list[tuple[Array, Array, Array, NDArray[np.int32]]](), []
+    train, parts, squares = scene.indices("train"), list[tuple[Array, Array, Array, NDArray[np.int32]]](), []
     for view in views:
         rgb, light = draw(splats.values, view_of(scene.camera_in_head(*view.key))).picture()
         squares.append(float(np.square(rgb - view.colours).mean()))
         sure = np.flatnonzero((view.opacity > 0.99).reshape(-1))
         sure = sure[:: max(1, len(sure) // LOOKED_AT)]
         colours, seen = (image.reshape(-1, 3)[sure] for image in (rgb, view.colours))
-        parts.append((colours, 1 - light.reshape(-1)[sure], seen, np.full(len(sure), view.camera, np.int32)))
+        camera = np.full(len(sure), train.index(view.key[0]), np.int32)
+        parts.append((colours, 1 - light.reshape(-1)[sure], seen, camera))
     shown, alpha, photos, numbers = (np.concatenate(each) for each in zip(*parts, strict=True))
-    fit = CameraFit.of(shown, alpha, photos, numbers, len(scene.indices("train")))
+    fit = CameraFit.of(shown, alpha, photos, numbers, len(train))
     return fit, -10 * math.log10(max(float(np.mean(squares)), 1e-10))
 
 
@@ -211,12 +204,4 @@ def _body(scene: Scene, how: GaussianParams, seed: int, start: Path | None) -> B
 
 
 def _nothing(scene: Scene) -> UserError:
-    return UserError(
-        "no subject was found in the images",
-        file=scene.folder,
-        place=f"frame {scene.frame_ids[reference_frame(scene)]}",
-        expected="something near the cameras' common point that stands out from what lies behind it",
-        found="nothing that several cameras agree on",
-        remedy="look at the pictures of the normalised scene: are they dark, empty or all alike? Then check the "
-        "calibration, or take other frames",
-    )
+    return no_subject(f"frame {scene.frame_ids[reference_frame(scene)]}", scene.folder)

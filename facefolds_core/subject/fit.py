@@ -1,4 +1,4 @@
-"""Fit Gaussians to pictures: small ones first."""
+"""Fit Gaussians to pictures: small ones first; fewer where there is nothing, more where the pictures pull."""
 
 from __future__ import annotations
 
@@ -12,18 +12,21 @@ from numpy.typing import NDArray
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.kernels.adam import corrections, decays
 from facefolds_core.subject.adam_kernel import adam_step
-from facefolds_core.subject.density import grown, thinned
 from facefolds_core.subject.drawing import View, differentiate, draw, view_of
 from facefolds_core.subject.gaussians import GaussianParams
 from facefolds_core.subject.loss import picture_loss
 from facefolds_core.subject.seeds import seeds
-from facefolds_core.subject.splats import COLOUR, COLUMNS, MEAN, OPACITY, SCALE, SHINE, TURN, Splats
+from facefolds_core.subject.splats import COLOUR, COLUMNS, MEAN, OPACITY, SCALE, SHINE, TURN, Splats, longest_axes
 
 Array = NDArray[np.float32]
 
 BETAS = (0.9, 0.999)
 ABSENT = -20.0
 """Logit of the opacity of a Gaussian that is left out of a picture."""
+APART, NARROW = 0.7, 0.7
+"""Halves of a Gaussian stand so far from its middle on its longest axis, and are so long, in standard deviations."""
+FAINTER = 0.8
+"""Opacity of the halves, in shares of the whole's."""
 
 
 @dataclass
@@ -144,6 +147,39 @@ def improve(
     state.moved += moved * max(target.view.size) / 2
     rates, correct = _rates(params, done), np.array(corrections(BETAS, before + 1), np.float32)
     adam_step(state.values, state.first, state.second, gradient, seen, rates, correct, decays(BETAS))
+
+
+def thinned(state: State, params: GaussianParams) -> State:
+    """Without those that are hardly there."""
+    kept = state.values[:, OPACITY] > np.log(params.faintest / (1 - params.faintest))
+    kept &= np.isfinite(state.values).all(1)
+    return State(state.values[kept], state.first[kept], state.second[kept], state.moved[kept])
+
+
+def grown(state: State, wanted: int) -> State:
+    """With so many Gaussians: those that the pictures pull at most are split along their longest axes."""
+    more = min(wanted - len(state.values), len(state.values))
+    pull = state.moved.copy()  # of all pictures: what many cameras see is divided first
+    state.moved[:] = 0
+    if more <= 0:
+        return state
+    chosen = np.argpartition(-pull, more - 1)[:more]
+    halves = state.values[chosen].copy()
+    offset = APART * longest_axes(halves)
+    rows, longest = np.arange(more), np.argmax(halves[:, SCALE], 1)
+    halves[rows, 3 + longest] += np.log(NARROW)
+    opacity = FAINTER / (1 + np.exp(-halves[:, OPACITY]))
+    halves[:, OPACITY] = np.log(opacity / (1 - opacity))
+    others = halves.copy()
+    halves[:, MEAN] += offset
+    others[:, MEAN] -= offset
+    state.values[chosen] = halves
+    state.first[chosen] = 0
+    state.first = np.concatenate([state.first, np.zeros_like(others)])
+    state.second = np.concatenate([state.second, state.second[chosen]])
+    state.values = np.concatenate([state.values, others])
+    state.moved = np.concatenate([state.moved, np.zeros(more, np.float32)])
+    return state
 
 
 def target_of(camera: Camera, picture: Array, opacity: Array | None, size: float) -> Target:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
@@ -10,11 +12,11 @@ from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import KDTree
 
 from facefolds_core.captures.scene import REACH, Scene
+from facefolds_core.errors import UserError
 from facefolds_core.geometry.cameras import Camera
-from facefolds_core.subject.density import longest_axes
 from facefolds_core.subject.drawing import draw, view_of
 from facefolds_core.subject.sight import seen_by
-from facefolds_core.subject.splats import Splats
+from facefolds_core.subject.splats import Splats, longest_axes
 
 Array = NDArray[np.float32]
 Bool = NDArray[np.bool_]
@@ -49,6 +51,18 @@ DOUBT = 0.7
 def reference_frame(scene: Scene) -> int:
     """The frame in which the subject is found: the middle one; of a head that turns the one nearest its mean pose."""
     return scene.num_frames // 2 if scene.poses is None else scene.poses.nearest()
+
+
+def no_subject(place: str, folder: Path | None = None) -> UserError:
+    return UserError(
+        "no subject was found in the images",
+        file=folder,
+        place=place,
+        expected="something near the cameras' common point that stands out from what lies behind it",
+        found="nothing that several cameras agree on",
+        remedy="look at the pictures of the normalised scene: are they dark, empty or all alike? Then check the "
+        "calibration, or take other frames",
+    )
 
 
 def subject_of(splats: Splats, scene: Scene) -> Bool:

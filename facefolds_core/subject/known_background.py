@@ -7,8 +7,6 @@ ring by ring, from the subject's inside outwards; each ring's colours tell the n
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -18,50 +16,22 @@ Array = NDArray[np.float32]
 Mask = NDArray[np.bool_]
 
 
-@dataclass(frozen=True)
-class PlateParams:
-    """Pictures beside their clean plates: what differs is the subject.
-
-    Attributes:
-        blur: blur of both before they are compared, standard deviation, pixels.
-        different: difference of a colour, in [0, 1], above which a pixel may be the subject's.
-        least: things smaller than this share of the largest are taken for shadows or reflections.
-        outline: pixels inside of the outline within which opacity is found from colours.
-        beyond: pixels outside of the outline within which opacity is found from colours.
-        faint: least difference of a colour that shows a little of the subject beyond the outline.
-        faint_noise: least value of `faint` in multiples of the pictures' noise.
-        noise: least standard deviation of noise that is reckoned with.
-        quiet: noise is measured at least so many pixels beyond the outline.
-        spread: neighbourhood whose colours the subject is taken to have at the outline, standard deviation,
-            pixels.
-        deviation: least standard deviation of the subject's colours at the outline.
-        alike: price, as a logarithm of likelihood, of an opacity that differs by 1 from those around it.
-        beside: surroundings of a pixel that `alike` compares, standard deviation, pixels.
-        solid: bonus, as a logarithm of likelihood, of an opacity of 1.
-        believed: standard deviation of an opacity from what the subject's Gaussians say.
-        steps: opacities from 0 to 1 that are compared.
-        weight: of the opacity that is expected so, beside the differences from its neighbours' in the closed form.
-    """
-
-    blur: float = 0.7
-    different: float = 0.05
-    least: float = 0.05
-    outline: int = 8
-    beyond: int = 6
-    faint: float = 0.012
-    faint_noise: float = 2.5
-    noise: float = 0.01
-    quiet: int = 12
-    spread: float = 6.0
-    deviation: float = 0.01
-    alike: float = 3.0
-    beside: float = 1.5
-    solid: float = 2.0
-    believed: float = 0.2
-    steps: int = 21
-    weight: float = 1.0
-
-
+NOISE = 0.01
+"""Least standard deviation of noise that is reckoned with."""
+SPREAD = 6.0
+"""Neighbourhood whose colours the subject is taken to have at the outline, standard deviation, pixels."""
+DEVIATION = 0.01
+"""Least standard deviation of the subject's colours at the outline."""
+ALIKE = 3.0
+"""Price, as a logarithm of likelihood, of an opacity that differs by 1 from those around it."""
+BESIDE = 1.5
+"""Surroundings of a pixel that `ALIKE` compares, standard deviation, pixels."""
+SOLID = 2.0
+"""Bonus, as a logarithm of likelihood, of an opacity of 1."""
+BELIEVED = 0.2
+"""Standard deviation of an opacity from what the subject's Gaussians say."""
+STEPS = 21
+"""Opacities from 0 to 1 that are compared."""
 TINY = float(np.finfo(np.float32).eps)
 """No mean is formed by a smaller weight, no variance is smaller."""
 
@@ -72,7 +42,6 @@ def opacity_before(
     inside: Mask,
     unknown: Mask,
     noise: float | Array,
-    params: PlateParams,
     start: tuple[Array, Array] | None = None,
 ) -> Array:
     """(H, W) in [0, 1]: 1 on `inside`, 0 beyond it and `unknown`.
@@ -89,16 +58,16 @@ def opacity_before(
     opacity, unknown = inside.astype(np.float32), unknown & ~inside
     colours, known = image.copy(), ~unknown
     away = np.ceil(np.asarray(ndimage.distance_transform_edt(~inside)))
-    subject = _Colours(colours, opacity, params)
+    subject = _Colours(colours, opacity)
     for distance in np.unique(away[unknown]):
         ring = np.nonzero(unknown & (away == distance))
         mean, covariance = subject.around(ring)
         sure = known.astype(np.float32)
-        beside = _blurred(opacity * sure, params.beside)[ring]
-        beside /= np.maximum(_blurred(sure, params.beside)[ring], TINY)
+        beside = _blurred(opacity * sure, BESIDE)[ring]
+        beside /= np.maximum(_blurred(sure, BESIDE)[ring], TINY)
         believed = None if start is None else (start[0][ring], start[1][ring])
         opacity[ring], colours[ring] = _likeliest(
-            image[ring], plate[ring], mean, covariance, beside, variance[ring][:, None], params, believed
+            image[ring], plate[ring], mean, covariance, beside, variance[ring][:, None], believed
         )
         subject.add(ring, colours[ring], opacity[ring])
         known[ring] = True
@@ -118,8 +87,7 @@ class _Colours:
         opacity: (H, W), 0 where it is not known yet; a pixel counts by its square.
     """
 
-    def __init__(self, colours: Array, opacity: Array, params: PlateParams) -> None:
-        self._params = params
+    def __init__(self, colours: Array, opacity: Array) -> None:
         self._sums = np.zeros(((opacity.shape[0] + 1) // 2, (opacity.shape[1] + 1) // 2, 10), np.float32)
         there = np.nonzero(opacity)
         self.add(there, colours[there], opacity[there])
@@ -134,7 +102,7 @@ class _Colours:
     def around(self, pixels: tuple[NDArray[np.int64], ...]) -> tuple[Array, Array]:
         """(P, 3) and (P, 3, 3)."""
         one, other = np.triu_indices(3)
-        wide = _blurred(self._sums, self._params.spread / 2)
+        wide = _blurred(self._sums, SPREAD / 2)
         here = _between(wide, pixels)
         if not (here[:, 0] > TINY).all():  # too far from what is known: as the nearest that is not
             near = ndimage.distance_transform_edt(wide[..., 0] <= TINY, return_distances=False, return_indices=True)
@@ -143,7 +111,7 @@ class _Colours:
         covariance = np.empty((len(here), 3, 3), np.float32)
         covariance[:, one, other] = here[:, 4:] / here[:, :1] - mean[:, one] * mean[:, other]
         covariance[:, other, one] = covariance[:, one, other]
-        return mean, covariance + self._params.deviation**2 * np.eye(3, dtype=np.float32)
+        return mean, covariance + DEVIATION**2 * np.eye(3, dtype=np.float32)
 
 
 def _between(half: Array, pixels: tuple[NDArray[np.int64], ...]) -> Array:
@@ -167,7 +135,6 @@ def _likeliest(
     covariance: Array,
     beside: Array,
     variance: Array,
-    params: PlateParams,
     start: tuple[Array, Array] | None,
 ) -> tuple[Array, Array]:
     """Expected opacity (P,), and the subject's colour (P, 3) with it.
@@ -179,7 +146,7 @@ def _likeliest(
         variance: (P, 1) of image and plate.
         start: (P,) opacity of the Gaussians, and how far it is believed.
     """
-    steps = np.linspace(0, 1, params.steps, dtype=np.float32)
+    steps = np.linspace(0, 1, STEPS, dtype=np.float32)
     variances, axes = np.linalg.eigh(covariance)
     variances = np.maximum(variances, TINY)
     across = np.einsum("pij,pi->pj", axes, mean - plate)
@@ -187,10 +154,10 @@ def _likeliest(
     spread = steps[:, None, None] ** 2 * variances + variance
     error = off - steps[:, None, None] * across
     chance = -0.5 * (error**2 / spread + np.log(spread)).sum(-1)
-    chance -= params.alike * np.abs(steps[:, None] - beside)
-    chance[-1] += params.solid
+    chance -= ALIKE * np.abs(steps[:, None] - beside)
+    chance[-1] += SOLID
     if start is not None:
-        chance -= 0.5 * start[1] * np.square((steps[:, None] - start[0]) / params.believed)
+        chance -= 0.5 * start[1] * np.square((steps[:, None] - start[0]) / BELIEVED)
     chance = np.exp(chance - chance.max(0))
     opacity = (chance * steps[:, None]).sum(0) / chance.sum(0)
     gain = opacity[:, None] * variances / (opacity[:, None] ** 2 * variances + variance)

@@ -10,51 +10,43 @@ from threading import RLock
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from facefolds_core.captures.cutout import cut_from
 from facefolds_core.captures.scene import Scene
-from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.torso import Torso
 from facefolds_core.spacing import spread
+from facefolds_core.subject.body import pictures
 from facefolds_core.subject.cut_out import (
     Array,
     Bool,
     Colours,
-    EdgeParams,
+    Image,
     agreement,
     colours_of,
     cut_out,
-    doubted,
-    grown,
-    pixels,
     softened,
 )
 from facefolds_core.subject.drawing import draw, view_of
 from facefolds_core.subject.fit import Target, target_of
-from facefolds_core.subject.found import (
-    background,
-    belief,
-    connected,
-    near_enough,
-    opacity_of,
-    reference_frame,
-    subject_of,
-)
+from facefolds_core.subject.found import background, opacity_of, reference_frame
 from facefolds_core.subject.plates import Start, from_plate
 from facefolds_core.subject.splats import Splats
 from facefolds_core.subject.standing import farthest_moved, if_still, in_frame, standing, torso_of
 from facefolds_core.subject.storage import Body
 from facefolds_core.system.threads import in_order
 
-Image = NDArray[np.uint8]
 Key = tuple[int, int]
 """(camera, frame) in the scene."""
 Source = Literal["capture", "named", "plate", "picture", "gaussians"]
 """Whence a matte is: it came with the capture, the user has named it, or it was found: beside a plate, in the picture,
 or, where the picture contradicts the others, from their Gaussians alone."""
 
+ASKED = 0.8
+"""IoU of a silhouette with the Gaussians', under which the picture is asked once more, with those of the subject alone,
+and in the frame of the Gaussians not believed: they show that very moment."""
+AGREEING = 0.65
+"""The same, under which no frame's is believed."""
 LOOKED_AT = 12
 """Pictures of a frame that tell what stands still, at most."""
 
@@ -81,7 +73,6 @@ class Mattes:
         scene: whose own mattes count.
         named: (H, W, 1) by picture, that the user has corrected; they come first.
         body: by which others are found; None while it is not known.
-        edge: how their outlines are found.
 
     Attributes:
         alone: Gaussians that were trained with the subject cut out, once they are known. They are whole where room of
@@ -94,9 +85,8 @@ class Mattes:
         scene: Scene,
         named: Mapping[Key, Image] | None = None,
         body: Body | None = None,
-        edge: EdgeParams | None = None,
     ) -> None:
-        self.scene, self.named, self.body, self.edge = scene, dict(named or {}), body, edge or EdgeParams()
+        self.scene, self.named, self.body = scene, dict(named or {}), body
         self.alone: Splats | None = None
         self._frames, self._plates, self._given = scene.open_frames(), scene.open_plates(), scene.open_mattes()
         self._drawn: tuple[Key, tuple[Array, Array]] | None = None
@@ -126,15 +116,22 @@ class Mattes:
         assert self.body is not None
         with self._drawing:  # from Python 3.12 on cached properties have no lock
             camera, colours, (start, behind) = self.scene.camera_in_head(*key), self._colours, self._seen(key)
-        cut = cut_out(picture, start, camera, colours, self.edge)
+        cut = cut_out(picture, start, camera, colours)
         share = agreement(cut, start > 0.5)
-        if share < self.edge.asked and self.alone is not None:
+        if share < ASKED and self.alone is not None:
             start = self._alone_in(key)
-            cut = cut_out(picture, start, camera, colours, self.edge)
+            cut = cut_out(picture, start, camera, colours)
             share = agreement(cut, start > 0.5)
-        if share < (self.edge.asked if key[1] == self.body.frame else self.edge.agreeing):
+        if share < (ASKED if key[1] == self.body.frame else AGREEING):
             return Matte(_bytes(start), "gaussians", share)
-        return Matte(_bytes(softened(picture, cut, start, behind, camera, self.edge)), "picture", share)
+        return Matte(_bytes(softened(picture, cut, start, behind, camera)), "picture", share)
+
+    def cut(self, key: Key, matte: Matte) -> tuple[Array, Array]:
+        """The subject cut out of a picture: its colours (H, W, 3) times opacity, and that, (H, W)."""
+        photo, opacity, plate = _values(self._frames.image(*key)), _values(matte.opacity), None
+        if self._plates is not None and self._plated(key):
+            plate = _values(self._plates.image(key[0], 0))
+        return np.asarray(cut_from(photo, opacity, plate), np.float32), opacity
 
     def _plated(self, key: Key) -> bool:
         return self._plates is not None and (key[0], 0) in self._plates
@@ -158,7 +155,7 @@ class Mattes:
         """Of the pictures of the body's frame, by the body as it was found."""
         assert self.body is not None
         body = self.body
-        return colours_of(_pictures(self.scene, body.splats, body.frame, body.subject), self.edge)
+        return colours_of(pictures(self.scene, body.splats, body.frame, body.subject))
 
     def _start(self, key: Key) -> Start | None:
         """What Gaussians say beside a plate, once they are known."""
@@ -189,8 +186,7 @@ class Mattes:
         for frame in farthest_moved(poses, body.frame):
             still = if_still(body.splats, poses, body.frame, frame)
             pairs.append((in_frame(body.splats, ~body.subject, poses, body.frame, frame), still))
-            seen = [(self.scene.camera_in_head(*key), self._frames.image(*key)) for key in self._keys(frame)]
-            targets.append([target_of(camera, _values(photo), None, 1.0) for camera, photo in seen])
+            targets.append([self._target(key, _values(self._frames.image(*key)), None) for key in self._keys(frame)])
         return ~body.subject | standing(pairs, targets, body.splats.means, body.subject)
 
     def begun(self) -> Splats:
@@ -232,16 +228,12 @@ class Mattes:
         first = reference_frame(self.scene)
         frames = farthest_moved(poses, first)
         pairs = [(alone, if_still(alone, poses, first, frame)) for frame in frames]
-        targets = [[self._cut_out(key) for key in self._keys(frame) if self.known(key)] for frame in frames]
+        known = [[key for key in self._keys(frame) if self.known(key)] for frame in frames]
+        targets = [[self._target(key, *self.cut(key, self._plain(key))) for key in keys] for keys in known]
         return standing(pairs, targets, alone.means)
 
-    def _cut_out(self, key: Key) -> Target:
-        """A picture whose matte is known without Gaussians, with the subject cut out of it."""
-        photo, opacity, plate = _values(self._frames.image(*key)), _values(self._plain(key).opacity), None
-        if self._plates is not None and self._plated(key):
-            plate = _values(self._plates.image(key[0], 0))
-        colours = np.asarray(cut_from(photo, opacity, plate), np.float32)
-        return target_of(self.scene.camera_in_head(*key), colours, opacity, 1.0)
+    def _target(self, key: Key, picture: Array, opacity: Array | None) -> Target:
+        return target_of(self.scene.camera_in_head(*key), picture, opacity, 1.0)
 
     def _keys(self, frame: int) -> list[Key]:
         """Some pictures of a frame, of training cameras."""
@@ -268,49 +260,6 @@ class Mattes:
                 seen = opacity_of(there, body.subject, self.scene.camera_in_head(*key))
                 self._drawn = same, (seen, background(body.splats, body.subject, room))
             return self._drawn[1]
-
-
-def body_among(scene: Scene, splats: Splats, frame: int, edge: EdgeParams | None = None) -> Body:
-    """The body at the centre, as the training pictures of a frame agree on it: what the Gaussians say of each picture
-    is said to the pixel by its colours, and these silhouettes vote on the Gaussians. Where a picture looks as it would
-    without them, they are not believed: before a plain wall some hang in the air, of its colour. What hangs behind the
-    subject is hidden by it from most cameras, which cannot vote against it: what stays must be connected."""
-    edge = edge or EdgeParams()
-    body, possible = Body(splats, subject_of(splats, scene), frame), near_enough(splats, scene)
-    believed = belief(splats, scene, body.subject)
-    for _ in range(edge.rounds):
-        marks = np.where(believed > 0, believed, 1) * body.subject
-        seen = [
-            (picture, doubted(picture, start, background(splats, body.subject, camera), camera, edge), camera)
-            for picture, start, camera in _pictures(scene, splats, frame, marks)
-        ]
-        colours, larger = colours_of(seen, edge), []
-        for picture, start, camera in seen:
-            cut = cut_out(picture, start, camera, colours, edge)
-            larger.append((camera, grown(cut.astype(np.uint8), pixels(edge.grow, camera)) > 0))
-        body = Body(splats, connected(splats, possible & _voted(splats, larger, edge.share), scene), frame)
-    return body
-
-
-def _pictures(scene: Scene, splats: Splats, frame: int, subject: Bool | Array) -> Iterator[tuple[Image, Array, Camera]]:
-    """Training pictures of a frame, the subject's opacity in them, and their cameras."""
-    store = scene.open_frames()
-    for i in scene.indices("train"):
-        if (i, frame) in store:
-            camera = scene.camera_in_head(i, frame)
-            yield store.image(i, frame), opacity_of(splats, subject, camera), camera
-
-
-def _voted(splats: Splats, cuts: list[tuple[Camera, Bool]], share: float) -> Bool:
-    """(N,) Gaussians that at least such a share of the silhouettes (H, W) has in whose pictures they lie."""
-    seen, inside = np.zeros(len(splats)), np.zeros(len(splats))
-    for camera, cut in cuts:
-        places, depth = camera.project(splats.means.astype(np.float64))
-        there = (places >= 0).all(1) & (places[:, 0] < camera.width) & (places[:, 1] < camera.height) & (depth > 0)
-        x, y = places[there].astype(np.int64).T
-        seen += there
-        inside[there] += cut[y, x]
-    return np.asarray((seen > 0) & (inside >= share * seen))
 
 
 def _values(image: Image) -> Array:

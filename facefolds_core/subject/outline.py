@@ -10,15 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from facefolds_core.errors import UserError
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.chart import Belt, Chart
 from facefolds_core.geometry.sphere_uv import Window
 from facefolds_core.params import StartParams
 from facefolds_core.subject import look_kernel
+from facefolds_core.subject.found import no_subject
 from facefolds_core.subject.volume import Volume
 
 Array = NDArray[np.float64]
+Bool = NDArray[np.bool_]
 
 MIN_RADIUS = 0.03
 """Least radius of a layer's middle, units: at c the search for crossings ends."""
@@ -90,6 +91,24 @@ def shells(volume: Volume, chart: Chart, uv: Array, radii: Array) -> tuple[NDArr
     return -np.expm1(-found[..., 0]).reshape(radii.shape), found[..., 1:].reshape(*radii.shape, 3)
 
 
+def grid_shape(window: Window, longest: int, least: int) -> tuple[int, int]:
+    """Rows and columns, at least so many, of a grid over a window whose cells are as wide as high."""
+    u0, u1, v0, v1 = window
+    scale = longest / max(u1 - u0, v1 - v0)
+    return max(least, round(scale * (u1 - u0))), max(least, round(scale * (v1 - v0)))
+
+
+def nodes_at(uv: Array, window: Window, shape: tuple[int, ...]) -> tuple[NDArray[np.intp], NDArray[np.intp], Bool]:
+    """Rows (P,) and columns (P,) of the nodes, of a grid (rows, columns) as of `window_uv`, that are nearest to (u, v)
+    (P, 2); and whether these lie within the window."""
+    u0, u1, v0, v1 = window
+    last = shape[0] - 1, shape[1] - 1
+    i, j = (u1 - uv[:, 0]) / (u1 - u0) * last[0], (uv[:, 1] - v0) / (v1 - v0) * last[1]
+    within = (i >= 0) & (i <= last[0]) & (j >= 0) & (j <= last[1])
+    row, column = (np.rint(at).astype(np.intp).clip(0, most) for at, most in zip((i, j), last, strict=True))
+    return row, column, np.asarray(within)
+
+
 def window_uv(window: Window, rows: int, columns: int) -> Array:
     """(rows, columns, 2) of the nodes of a radius map: they include the window's borders."""
     u, v = np.linspace(window[1], window[0], rows), np.linspace(window[2], window[3], columns)
@@ -125,7 +144,7 @@ def whole_window(chart: Chart, params: StartParams) -> Window:
     return -lowest, params.window_limit, -params.azimuth_limit, params.azimuth_limit
 
 
-def lost(volume: Volume, chart: Chart, points: Array, params: StartParams) -> NDArray[np.bool_]:
+def lost(volume: Volume, chart: Chart, points: Array, params: StartParams) -> Bool:
     """(P,) whether no sheet over the chart can hold a visible point.
 
     They lie behind it or at its rim, nearer to c than layers may, or beneath or above the outermost surface in their
@@ -137,9 +156,7 @@ def lost(volume: Volume, chart: Chart, points: Array, params: StartParams) -> ND
     radii = profile(volume, chart, window_uv(window, rows, columns), params.subject_opacity).radius
     high = ndimage.maximum_filter(np.where(np.isnan(radii), -np.inf, radii), 3)
     low = ndimage.minimum_filter(np.where(np.isnan(radii), np.inf, radii), 3)
-    i, j = (u1 - uv[:, 0]) / (u1 - u0) * (rows - 1), (uv[:, 1] - v0) / (v1 - v0) * (columns - 1)
-    within = (i >= 0) & (i <= rows - 1) & (j >= 0) & (j <= columns - 1)
-    i, j = np.rint(i).astype(int).clip(0, rows - 1), np.rint(j).astype(int).clip(0, columns - 1)
+    i, j, within = nodes_at(uv, window, (rows, columns))
     margin = 2 * volume.voxel
     held = within & (radius <= high[i, j] + margin) & (radius >= np.maximum(low[i, j] - margin, MIN_RADIUS))
     return np.asarray(~held)
@@ -157,14 +174,7 @@ def choose_chart(volume: Volume, views: Sequence[Array], params: StartParams) ->
     """
     points, ends = np.concatenate(views), np.cumsum([len(one) for one in views])[:-1]
     if not len(points):
-        raise UserError(
-            "no subject was found in the images",
-            place="the middle frame",
-            expected="something near the cameras' common point that stands out from what lies behind it",
-            found="nothing that several cameras agree on",
-            remedy="look at the pictures of the normalised scene: are they dark, empty or all alike? Then check the "
-            "calibration, or take other frames",
-        )
+        raise no_subject("the middle frame")
     charts = [chart for x in params.centres for chart in _charts(x, points, params)]
     gone = {chart: lost(volume, chart, points, params) for chart in charts}
     losses = {chart: float(one.mean()) for chart, one in gone.items()}

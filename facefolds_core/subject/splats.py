@@ -27,6 +27,19 @@ OPACITY = 10
 COLUMNS = 23
 
 
+def longest_axes(values: Array) -> Array:
+    """(n, 3) along the longest axes of Gaussians (n, COLUMNS), one standard deviation long."""
+    w, x, y, z = (values[:, TURN] / np.linalg.norm(values[:, TURN], axis=1, keepdims=True)).T
+    columns = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)],
+        [2 * (x * y - w * z), 1 - 2 * (x * x + z * z), 2 * (y * z + w * x)],
+        [2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)],
+    ]
+    rows, longest = np.arange(len(values)), np.argmax(values[:, SCALE], 1)
+    axes = np.array(columns).transpose(2, 0, 1)[rows, longest]
+    return np.asarray(axes * np.exp(values[rows, 3 + longest])[:, None], np.float32)
+
+
 @dataclass(frozen=True)
 class Splats:
     """N Gaussians and what is behind all of them.

@@ -28,9 +28,8 @@ from facefolds_core.training.checkpoints import (
 from facefolds_core.training.log import log_metrics, open_log
 from facefolds_core.training.losses import Losses, batch_losses
 from facefolds_core.training.rays import RaySampler
-from facefolds_core.training.report import TrainingReport, device_name, make_report, peak_memory
+from facefolds_core.training.report import Trained, TrainingReport, device_name, make_report, peak_memory
 from facefolds_core.training.start import Start, find_start, fit_outline
-from facefolds_core.training.trained import Trained
 
 LOG_POINTS = 500
 """Lines in the log of a whole training, at least; never more than 100 iterations apart."""

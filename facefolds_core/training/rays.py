@@ -13,6 +13,15 @@ from facefolds_core.errors import UserError
 from facefolds_core.model.intersection import search_interval
 
 
+def nothing_seen(scene: Scene) -> UserError:
+    return UserError(
+        "no pixel of any training camera sees the subject",
+        file=scene.folder / "scene.json",
+        expected="cameras that look at the origin",
+        remedy="check the capture's calibration, and `front` or the head poses",
+    )
+
+
 @dataclass(frozen=True)
 class Rays:
     """A batch of R rays with their true colours.
@@ -62,12 +71,7 @@ class RaySampler:
         self.pixels = torch.cat(pixels)
         self.ends = torch.tensor([len(p) for p in pixels]).cumsum(0)
         if len(self.pixels) == 0:
-            raise UserError(
-                "no pixel of any training camera sees the subject",
-                file=scene.folder / "scene.json",
-                expected="cameras that look at the origin",
-                remedy="check the capture's calibration, and `front` or the head poses",
-            )
+            raise nothing_seen(scene)
         # Pixel (x, y, 1) -> direction in the head's frame: R^T K^-1. Of a still head one camera serves all frames.
         self.turns = len(turns)
         views = [scene.camera_in_head(c, k) for c in self.cameras for k in turns]

@@ -121,8 +121,7 @@ def surface_points(volume: Volume, camera: Camera) -> Points:
     alpha, depth = alpha.reshape(pixels.shape[:2]), depth.reshape(pixels.shape[:2]).astype(np.float64)
     there = origins + depth[..., None] * directions
     across, down = np.gradient(there, axis=1), np.gradient(there, axis=0)
-    normals = np.cross(across, down)
-    normals /= np.maximum(np.linalg.norm(normals, axis=-1, keepdims=True), 1e-12)
+    normals = unit(np.cross(across, down))
     normals *= -np.sign((normals * directions).sum(-1, keepdims=True))
     solid = (alpha > MIN_OPACITY) & (depth > 0)
     solid = cv2.erode(solid.astype(np.uint8), np.ones((3, 3), np.uint8), borderValue=0) > 0
@@ -143,15 +142,11 @@ def weighted(points: Sequence[Points]) -> list[Points]:
     return [replace(one, weight=np.exp(-0.5 * (r / width) ** 2)) for one, r in zip(points, far, strict=True)]
 
 
-@dataclass(frozen=True)
-class _Scale:
-    """Attributes:
-    sigma: pixels.
-    seen: of each camera (P,), what its points looked like in the reference frame.
-    """
-
-    sigma: float
-    seen: list[Array]
+def _seen(scene: Scene, points: Sequence[Points], frame: int, sigma: float) -> list[Array]:
+    """Of each training camera (P,), what its points look like in a frame, at a scale (pixels)."""
+    store = scene.open_frames()
+    first = [features(store.image(i, frame), sigma) for i in scene.indices("train")]
+    return [look_up(a, p.pixels)[:, 0] for a, p in zip(first, points, strict=True)]
 
 
 def _all_frames(
@@ -163,11 +158,8 @@ def _all_frames(
 ) -> tuple[list[Similarity], Array]:
     """Poses of all frames against the reference, from it outwards; and their likeness to it."""
     store, indices = scene.open_frames(), scene.indices("train")
-    scales = []
-    for share in SCALES:
-        sigma = share * min(scene.width, scene.height)
-        first = [features(store.image(i, reference), sigma) for i in indices]
-        scales.append(_Scale(sigma, [look_up(a, p.pixels)[:, 0] for a, p in zip(first, points, strict=True)]))
+    sigmas = [share * min(scene.width, scene.height) for share in SCALES]
+    scales = [(sigma, _seen(scene, points, reference, sigma)) for sigma in sigmas]
     poses = [Similarity.identity()] * scene.num_frames
     likeness = np.ones(scene.num_frames)
     for step in (1, -1):
@@ -175,9 +167,9 @@ def _all_frames(
         for k in range(reference + step, scene.num_frames if step > 0 else -1, step):
             pose = last.after(before.inverse()).after(last)  # as fast as before
             images = [store.image(i, k) for i in indices]
-            for scale in scales:
-                shown = [features(image, scale.sigma) for image in images]
-                pose, likeness[k] = refined(pose, cameras, points, shown, scale.seen)
+            for sigma, seen in scales:
+                shown = [features(image, sigma) for image in images]
+                pose, likeness[k] = refined(pose, cameras, points, shown, seen)
             poses[k], before, last = pose, last, pose
             bar.update()
     return poses, likeness
@@ -197,8 +189,7 @@ def _deepened(
     """
     store, indices = scene.open_frames(), scene.indices("train")
     sigma = SCALES[-1] * min(scene.width, scene.height)
-    first = [features(store.image(i, reference), sigma) for i in indices]
-    seen = [look_up(a, p.pixels)[:, 0] for a, p in zip(first, points, strict=True)]
+    seen = _seen(scene, points, reference, sigma)
     found, likeness = list(poses), np.ones(len(poses))
 
     def shown(k: int) -> list[Picture]:

@@ -1,12 +1,18 @@
-"""What every trainer reports."""
+"""What every training gives, and how it is written."""
 
 from __future__ import annotations
 
 import resource
 import time
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
 
 import torch
+
+from facefolds_core.files.writing import atomic_folder, write_json
+from facefolds_core.model.radiance import RadianceManifolds
+from facefolds_core.model.storage import Spec, save_model
 
 IMPORTED = time.process_time()
 """Processor time of this process until here."""
@@ -64,3 +70,32 @@ def make_report(
         peak_memory_bytes=memory,
         final_psnr=round(psnr, 3),
     )
+
+
+@dataclass(frozen=True)
+class Trained:
+    """What a training gives.
+
+    Attributes:
+        model: what the export and the evaluation take.
+        spec: what `model.json` says of it.
+        report: seconds, iterations, PSNR on training rays.
+        fit: what was chosen and why (`fit.json`), of models that choose.
+    """
+
+    model: RadianceManifolds
+    spec: Spec
+    report: TrainingReport
+    fit: dict[str, Any] | None = None
+
+    def save(self, folder: Path) -> None:
+        """Write the model's folder, whole or not at all."""
+        with atomic_folder(folder) as temporary:
+            self.write(temporary)
+
+    def write(self, folder: Path) -> None:
+        """Write the model's files into a folder that is there."""
+        save_model(self.model, self.spec, folder)
+        write_json(folder / "training.json", asdict(self.report))
+        if self.fit is not None:
+            write_json(folder / "fit.json", self.fit)

@@ -112,7 +112,7 @@ def test_strides_downwards_miss_no_ledge(elevation: float) -> None:
     column = RadialManifolds(chart, window, middle, torch.full_like(middle, 0.001), 2)
     azimuth = np.linspace(-2, 2, 200)
     offsets = np.stack([0.2 * np.cos(azimuth), 0.2 * np.sin(azimuth), np.linspace(0.03, 0.06, 200)], -1)
-    found = column.compiled_distances(offsets, np.tile([0.0, 0.0, -1.0], (200, 1)))
+    found = column.tracer()(offsets, np.tile([0.0, 0.0, -1.0], (200, 1)), None)
     assert (found > 0).all()
 
 

@@ -6,7 +6,7 @@ import pytest
 import torch
 
 from facefolds_core.model.compositing import compositing_weights
-from facefolds_core.model.encoding import encoded_size, positional_encoding
+from facefolds_core.model.textures import encoded_size, positional_encoding
 
 
 def test_encoding_closed_form() -> None:

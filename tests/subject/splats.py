@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
 from facefolds_core.captures.scene import Scene
-from facefolds_core.subject.cameras import CameraFit
+from facefolds_core.geometry.cameras import Camera
+from facefolds_core.subject.drawing import draw, view_of
 from facefolds_core.subject.splats import COLUMNS, Splats
 from facefolds_core.subject.storage import FoundSubject
+from tests.scenes import cameras_alike
 
 
 def some_splats(count: int, seed: int = 0) -> NDArray[np.float32]:
@@ -23,8 +27,18 @@ def some_splats(count: int, seed: int = 0) -> NDArray[np.float32]:
     return values
 
 
+def some(count: int = 300) -> Splats:
+    """The same before black."""
+    return Splats(some_splats(count), np.zeros(3, np.float32))
+
+
+def drawn(splats: Splats, cameras: Sequence[Camera]) -> NDArray[np.uint8]:
+    """(C, H W, 4) cut-outs of all cameras."""
+    seen = [draw(splats.values, view_of(camera)).picture() for camera in cameras]
+    whole = [np.concatenate([rgb, 1 - light[..., None]], -1).reshape(-1, 4) for rgb, light in seen]
+    return np.rint(255 * np.clip(whole, 0, 1)).astype(np.uint8)
+
+
 def found(scene: Scene, psnr: float) -> FoundSubject:
     """Some of them as a scene's subject that explains its pictures with so many dB."""
-    return FoundSubject(
-        Splats(some_splats(200), np.zeros(3, np.float32)), psnr, CameraFit.alike(len(scene.indices("train")))
-    )
+    return FoundSubject(some(200), psnr, cameras_alike(len(scene.indices("train"))))

@@ -8,7 +8,7 @@ import pytest
 
 from facefolds_core.subject.cameras import MAX_ERROR_RATIO, MIN_GAIN_SPREAD, CameraFit, camera_errors, camera_gains
 from facefolds_core.training.explicit.cameras import choose_cameras
-from tests.scenes import OPAQUE, make_scene
+from tests.scenes import OPAQUE, cameras_alike, make_scene
 
 COUNT, EACH = 6, 400
 
@@ -72,7 +72,7 @@ def test_one_camera_far_off_is_left_out_by_name(tmp_path: Path) -> None:
     scene = make_scene(tmp_path / "scene", OPAQUE, size=12)
     errors = np.full(COUNT, 0.05)
     errors[3] = 0.05 * MAX_ERROR_RATIO * 1.1
-    choice = choose_cameras(scene, replace(CameraFit.alike(COUNT), errors=errors))
+    choice = choose_cameras(scene, replace(cameras_alike(COUNT), errors=errors))
     # Training cameras are 0, 1, 2, 4, 5, 6.
     assert choice.scene.indices("train") == [0, 1, 2, 5, 6] and choice.scene.indices("holdout") == [3]
     assert [(n.kind, n.camera) for n in choice.notes] == [("camera_contradicts", "cam4")] and choice.gains.shape == (
@@ -85,6 +85,6 @@ def test_one_camera_far_off_is_left_out_by_name(tmp_path: Path) -> None:
 
 def test_cameras_alike_change_nothing(tmp_path: Path) -> None:
     scene = make_scene(tmp_path / "scene", OPAQUE, size=12)
-    choice = choose_cameras(scene, CameraFit.alike(COUNT))
+    choice = choose_cameras(scene, cameras_alike(COUNT))
     assert choice.scene.splits == scene.splits and choice.notes == ()
     assert (choice.gains == 1).all()

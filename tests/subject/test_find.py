@@ -22,11 +22,10 @@ from facefolds_core.params import SubjectParams
 from facefolds_core.subject import find
 from facefolds_core.subject.find import all_mattes, find_subject, found_in, frames_looked_at, subject_in
 from facefolds_core.subject.fit import fit_pictures
-from facefolds_core.subject.folder import make_folder
+from facefolds_core.subject.folder import RED, make_folder, tile
 from facefolds_core.subject.found import DOUBT, belief, joined, subject_of
 from facefolds_core.subject.mattes import Matte, Mattes
 from facefolds_core.subject.ply import write_ply
-from facefolds_core.subject.sheet import RED, tile
 from facefolds_core.subject.splats import MEAN, OPACITY, SCALE, Splats
 from facefolds_core.subject.storage import BODY, Body, read_found, write_body, write_found
 from tests.assets import TORSO
@@ -56,19 +55,17 @@ def scene(folders: SubjectFolders) -> Scene:
     return made
 
 
-def put(folder: Path, scene: Scene, camera: int, frame: int | None, value: int, shape: tuple[int, int]) -> Path:
-    """A matte of the user's."""
-    name = scene.cameras[camera].name
-    path = folder / (f"{name}.png" if frame is None else f"{name}/{scene.frame_ids[frame]}.png")
-    path.parent.mkdir(parents=True, exist_ok=True)
-    Image.fromarray(np.full(shape, value, np.uint8)).save(path)
+def put(folder: Path, scene: Scene, value: int, shape: tuple[int, int]) -> Path:
+    """A matte of the user's, of all frames of a camera."""
+    folder.mkdir()
+    Image.fromarray(np.full(shape, value, np.uint8)).save(folder / f"{scene.cameras[2].name}.png")
     return folder
 
 
 def test_each_picture_has_a_matte_named_ones_first_then_the_captures_then_beside_plates(
     scene: Scene, folders: SubjectFolders, tmp_path: Path
 ) -> None:
-    named = put(tmp_path / "named", scene, 2, None, 150, (SIZE // 2, SIZE // 2))  # of all frames, of another size
+    named = put(tmp_path / "named", scene, 150, (SIZE // 2, SIZE // 2))  # of another size
     found, told = make_folder(scene, folders.subject, PARAMS, named)
     assert Counter(one["source"] for one in told) == {"capture": 1, "named": 2, "plate": 11}
     whole = found_scene(folders)
@@ -108,7 +105,7 @@ def test_a_folder_without_mattes_is_refused(scene: Scene, folders: SubjectFolder
 
 
 def test_a_named_one_of_another_shape_is_refused(scene: Scene, folders: SubjectFolders, tmp_path: Path) -> None:
-    named = put(tmp_path / "named", scene, 2, None, 0, (SIZE, SIZE // 2))
+    named = put(tmp_path / "named", scene, 0, (SIZE, SIZE // 2))
     with pytest.raises(UserError, match="another shape") as caught:
         make_folder(scene, folders.subject, PARAMS, named)
     assert scene.cameras[2].name in str(caught.value)

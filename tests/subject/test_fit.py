@@ -15,16 +15,18 @@ from facefolds_core.geometry.quaternions import rotation
 from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.geometry.track import Track
 from facefolds_core.subject import mattes as mattes_module
-from facefolds_core.subject.cut_out import EdgeParams, agreement
+from facefolds_core.subject.body import body_among
+from facefolds_core.subject.cut_out import agreement
 from facefolds_core.subject.drawing import render
 from facefolds_core.subject.find import fit_room, pictures_of
 from facefolds_core.subject.fit import fit_pictures
 from facefolds_core.subject.foreign import moved, read_start
 from facefolds_core.subject.found import background, near_enough, subject_of
 from facefolds_core.subject.gaussians import GaussianParams
-from facefolds_core.subject.mattes import Body, Mattes, body_among
+from facefolds_core.subject.mattes import Mattes
 from facefolds_core.subject.ply import write_ply
 from facefolds_core.subject.splats import COLOUR, COLUMNS, MEAN, OPACITY, SCALE, TURN, Splats
+from facefolds_core.subject.storage import Body
 from facefolds_core.subject.sweep import depth_maps
 from tests.scenes import OPAQUE, first_hit, look_at_origin
 from tests.scenes import render as true_picture
@@ -164,11 +166,14 @@ def test_a_picture_that_contradicts_the_others_is_not_believed(
     assert (found.source, found.agreement) == (source, share)
 
 
-def test_a_picture_that_contradicts_the_first_fit_is_asked_of_the_subject_alone(scene: Scene, splats: Splats) -> None:
+def test_a_picture_that_contradicts_the_first_fit_is_asked_of_the_subject_alone(
+    scene: Scene, splats: Splats, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(mattes_module, "ASKED", 1.01)  # none agrees
     masks = scene.open_masks()
     assert masks is not None
     true = masks.image(HELD, 0)[..., 0] > 127
-    mattes = Mattes(scene, body=body_among(scene, splats, 0), edge=EdgeParams(asked=1.01))  # none agrees
+    mattes = Mattes(scene, body=body_among(scene, splats, 0))
     before, (colours, opacities) = mattes.of((HELD, 0)), cut_outs(scene)
     mattes.alone = fit_pictures(scene.cameras, colours, PARAMS, 0, opacities)
     found = mattes.of((HELD, 0))

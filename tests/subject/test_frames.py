@@ -4,31 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from facefolds_core.subject.drawing import draw, view_of
 from facefolds_core.subject.frames import RIDE, changed_to, mean_errors, ridden, targets_of
 from facefolds_core.subject.splats import COLOUR, MEAN, Splats
 from tests.scenes import look_at_origin
-from tests.subject.splats import some_splats
+from tests.subject.splats import drawn, some, some_splats
 
 CAMERAS = [look_at_origin(f"c{a}", a, 5, 48) for a in (-40, -15, 15, 40)]
 
 
-def cut_out(splats: Splats) -> np.ndarray:
-    """(C, H W, 4) of all cameras."""
-    found = []
-    for camera in CAMERAS:
-        rgb, light = draw(splats.values, view_of(camera)).picture()
-        found.append(np.concatenate([rgb, 1 - light[..., None]], -1).reshape(-1, 4))
-    return np.rint(255 * np.clip(found, 0, 1)).astype(np.uint8)
-
-
-def some() -> Splats:
-    return Splats(some_splats(300), np.zeros(3, np.float32))
-
-
 def test_nothing_changes_before_its_own_pictures() -> None:
     splats = some()
-    targets = targets_of(CAMERAS, cut_out(splats))
+    targets = targets_of(CAMERAS, drawn(splats, CAMERAS))
     errors = mean_errors(splats, targets)
     assert errors.max() < 0.05  # colours above 1 are clipped in pictures
     assert changed_to(splats, errors, targets, 0) is splats
@@ -38,7 +24,7 @@ def test_what_another_colour_contradicts_follows_and_the_rest_stays_bit_for_bit(
     splats, other = some(), some_splats(300)
     upper = splats.means[:, 2] > 0.1
     other[upper, COLOUR] = 1 - other[upper, COLOUR]
-    before, after = (targets_of(CAMERAS, cut_out(one)) for one in (splats, Splats(other, splats.background)))
+    before, after = (targets_of(CAMERAS, drawn(one, CAMERAS)) for one in (splats, Splats(other, splats.background)))
     usual = mean_errors(splats, before)
     found = changed_to(splats, usual, after, 0)
     still = (found.values == splats.values).all(1)
@@ -48,7 +34,7 @@ def test_what_another_colour_contradicts_follows_and_the_rest_stays_bit_for_bit(
 
 
 def test_gaussians_ride_on_the_nearest_vertex_and_what_is_far_off_stays() -> None:
-    splats = Splats(some_splats(3), np.zeros(3, np.float32))
+    splats = some(3)
     vertices = np.array([[0.0, 0, 0], [1.0, 0, 0]])
     splats.values[:, MEAN] = [[0, 0, 0], [1, RIDE / 2, 0], [0, 2 * RIDE, 0]]
     moved = ridden(splats, vertices, np.array([[0, 0, 0.1], [1.2, 0, 0]]))

@@ -9,10 +9,8 @@ import pytest
 
 from facefolds_core.errors import UserError
 from facefolds_core.subject.ply import NEEDED, read_ply, write_ply
-from facefolds_core.subject.splats import COLOUR, MEAN, OPACITY, SCALE, SHINE, TURN, Splats
-from tests.subject.splats import some_splats
-
-BLACK = np.zeros(3, np.float32)
+from facefolds_core.subject.splats import COLOUR, MEAN, OPACITY, SCALE, SHINE, TURN
+from tests.subject.splats import some
 
 
 def header(names: list[str], count: int, form: str = "ascii", kind: str = "float") -> bytes:
@@ -26,7 +24,7 @@ def row(names: list[str], **values: float) -> list[float]:
 
 
 def test_what_is_written_comes_back(tmp_path: Path) -> None:
-    splats = Splats(some_splats(20), BLACK)
+    splats = some(20)
     write_ply(tmp_path / "a.ply", splats)
     np.testing.assert_allclose(read_ply(tmp_path / "a.ply").values, splats.values, rtol=1e-5, atol=1e-6)
 
@@ -95,7 +93,7 @@ def test_faults(tmp_path: Path, name: str) -> None:
 
 
 def test_a_binary_file_that_is_cut_off(tmp_path: Path) -> None:
-    write_ply(tmp_path / "a.ply", Splats(some_splats(20), BLACK))
+    write_ply(tmp_path / "a.ply", some(20))
     data = (tmp_path / "a.ply").read_bytes()
     for wrong, words in ((data[:-7], "cut off"), (data + b"1234", "longer")):
         (tmp_path / "b.ply").write_bytes(wrong)

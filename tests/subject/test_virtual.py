@@ -10,17 +10,18 @@ import pytest
 from facefolds_core.subject.splats import Splats
 from facefolds_core.subject.virtual import FEW, GAP, VIEWS, seen_by_few, virtual_cameras
 from tests.scenes import look_at_origin
-from tests.subject.splats import some_splats
+from tests.subject.splats import some
 
-SUBJECT = Splats(some_splats(400), np.zeros(3, np.float32))
+SUBJECT = some(400)
 
 
 def slab() -> Splats:
     """Opaque Gaussians on two squares, 0.2 units apart along x."""
     places = np.stack(np.meshgrid([-0.1, 0.1], *2 * [np.linspace(-0.2, 0.2, 31)], indexing="ij"), -1).reshape(-1, 3)
-    values = some_splats(len(places))
+    found = some(len(places))
+    values = found.values
     values[:, :3], values[:, 3:6], values[:, 6:11] = places, np.log(0.012), [1, 0, 0, 0, 5]
-    return Splats(values, np.zeros(3, np.float32))
+    return found
 
 
 SLAB = slab()

@@ -7,7 +7,7 @@ from torch import Tensor
 
 from facefolds_core.kernels.adam import EPSILON, Betas
 from facefolds_core.kernels.hit_codes import SCALE
-from facefolds_core.model.compositing import compositing_weights, transmittances
+from facefolds_core.model.compositing import compositing_weights
 from facefolds_core.training.explicit.shading_kernel import PRICE
 
 
@@ -35,9 +35,15 @@ def look_up(codes: Tensor, texture: Tensor) -> Tensor:
     return torch.cat([rgba[..., :3], rgba[..., 3:] * hit], -1)
 
 
+def light_before(alpha: Tensor) -> Tensor:
+    """prod_{k<i} (1 - alpha_k), [..., N]: what comes to each layer."""
+    through = torch.cumprod(1 - alpha, -1)
+    return torch.cat([torch.ones_like(alpha[..., :1]), through[..., :-1]], -1)
+
+
 def visible(alpha: Tensor, min_alpha: float, min_light: float) -> Tensor:
     """[R, N] bool: layers with at least `min_alpha` of alpha that do not lie behind less light than `min_light`."""
-    before, _ = transmittances(torch.where(alpha >= min_alpha, alpha, 0.0))
+    before = light_before(torch.where(alpha >= min_alpha, alpha, 0.0))
     return (alpha >= min_alpha) & (before >= min_light)
 
 
@@ -115,15 +121,10 @@ def _adam(state: Tensor, g: Tensor, met: Tensor, rate: Tensor, correct: Tensor, 
 
 
 def errors_by_texel(
-    codes: Tensor,  # [R, N, 2] int32
-    of: Tensor,  # [R], which of the P pixels a ray goes through
-    cut: Tensor,  # [P, 4] in [0, 1], colours times opacity
-    behind: Tensor,  # [P, 4], of the colours behind the mean, and their variances' sum
-    texture: Tensor,  # [H, W, N, 4]
-    shine: Tensor,  # [P, 3]
-    min_light: float,
+    codes: Tensor, of: Tensor, cut: Tensor, behind: Tensor, texture: Tensor, shine: Tensor, min_light: float
 ) -> Tensor:
-    """As `shading_kernel.shade` with `shares`: [H, W, N, 4], over the rays w (C - I) of their pixel, and w."""
+    """As `shading_kernel.shade` with `shares`: [H, W, N, 4], over the rays w (C - I) of their pixel, and w. Arguments
+    as of `shade`."""
     texture = texture.detach().clone().requires_grad_()
     with torch.enable_grad():
         rgba = look_up(codes, texture)
@@ -142,7 +143,7 @@ def errors_by_texel(
 def light_on(codes: Tensor, texture: Tensor, chosen: Tensor, min_light: float) -> Tensor:
     """As `follow_kernel.light_on`: [R, N, 2] int32, [H, W, N, 4], [H, W] bool -> [R]."""
     marked = chosen[..., None, None].to(texture).expand(texture.shape)
-    before, _ = transmittances(look_up(codes, texture)[..., 3])
+    before = light_before(look_up(codes, texture)[..., 3])
     met = (look_up(codes, marked)[..., 3] > 0) & (before >= min_light)
     return torch.where(met, before, 0.0).amax(1)
 

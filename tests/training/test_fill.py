@@ -1,15 +1,17 @@
-"""What the layers begin with: the opacity and the colours that the subject's Gaussians put on them."""
+"""What the layers begin with: the opacity and the colours that the subject's Gaussians put on them; and what goes at
+the end."""
 
 from __future__ import annotations
 
 from functools import partial
 
 import numpy as np
+import pytest
 import torch
 
 from facefolds_core.params import ExplicitParams
-from facefolds_core.training.explicit.state import BELIEF, FAINT, MAX_OPACITY, MIN_OPACITY, TextureState
-from facefolds_core.training.explicit.views import Views
+from facefolds_core.training.explicit.state import BELIEF, FAINT, MAX_OPACITY, MIN_OPACITY, TextureState, loose
+from tests.training.rays import one_each
 
 
 def test_layers_begin_with_what_is_given_and_keep_what_they_have_learnt() -> None:
@@ -47,8 +49,7 @@ def test_steps_draw_opacity_back_to_what_is_believed() -> None:
     """A step on rays that meet nothing changes logits by this alone: of the difference 1 - BELIEF is left."""
     state = TextureState((4, 6), 3, 2, torch.full((2, 2, 3), 0.5), ExplicitParams())
     state.fill(np.full((24, 3), 0.5, np.float32))
-    numbers = np.zeros(2, np.int32)
-    views = Views.centred(np.zeros((2, 3, 2), np.uint16), numbers, numbers, np.zeros((2, 3), np.float32))
+    views = one_each(np.zeros((2, 3, 2), np.uint16))
     step = partial(state.step, views, np.arange(2), OneColour(), 0, 0.0, np.full(5, 0.1, np.float32))
     step()
     torch.testing.assert_close(state.layers[0, ..., 3], torch.zeros(24, 3))
@@ -73,15 +74,36 @@ def test_what_stays_fainter_than_a_code_in_all_frames_goes() -> None:
 
 
 class OneColour:
-    """A picture of one pixel."""
+    """A picture of two pixels."""
 
     behind = np.array([[0.5, 0.5, 0.5, 0]], np.float32)
 
     def cut(self, index: int) -> np.ndarray:
-        return np.full((1, 1, 4), 255, np.uint8)
+        return np.full((1, 2, 4), 255, np.uint8)
 
-    def shuffle(self, random: np.random.Generator) -> None:
-        pass
 
-    def average(self) -> None:
-        pass
+def _head() -> np.ndarray:
+    opacity = np.zeros((60, 60))
+    opacity[10:50, 10:40] = 1.0
+    return opacity
+
+
+def test_a_splinter_goes_with_fog_and_the_head_with_its_soft_edge_stays() -> None:
+    opacity = _head()
+    opacity[30:34, 50:52] = 0.8
+    opacity[20, 40:42] = 0.1  # hair
+    opacity[2:5, 50:58] = 0.1  # fog
+    apart = loose(opacity)
+    assert apart[30:34, 50:52].all() and apart[2:5, 50:58].all()
+    assert not apart[10:50, 10:40].any() and not apart[20, 40:42].any()
+
+
+def test_a_large_second_body_stays() -> None:
+    opacity = _head()
+    opacity[10:50, 48:55] = 0.8  # a fifth of the head's
+    assert not loose(opacity)[10:50, 48:55].any()
+
+
+@pytest.mark.parametrize("opacity", [0.0, 0.2])
+def test_nothing_goes_where_nothing_is_opaque(opacity: float) -> None:
+    assert not loose(np.full((4, 4), opacity)).any()

@@ -16,6 +16,7 @@ from facefolds_core.training.explicit.targets import ALL_COLOURS
 from facefolds_core.training.explicit.views import StillRays, Views
 from tests.threads import on_threads
 from tests.training import reference
+from tests.training.rays import one_each
 
 PARAMS = ExplicitParams()
 LAYERS, SHAPE, RAYS = 4, (9, 7), 600
@@ -26,9 +27,7 @@ def random_views(rays: int = RAYS) -> Views:
     rng = np.random.default_rng(0)
     codes = rng.integers(1, 65536, (rays, LAYERS, 2)).astype(np.uint16)
     codes[rng.random((rays, LAYERS)) < 0.2] = 0
-    return Views.centred(
-        codes, np.zeros(rays, np.int32), np.arange(rays, dtype=np.int32), np.zeros((rays, 3), np.float32)
-    )
+    return one_each(codes)
 
 
 def random_texture() -> np.ndarray:
@@ -93,9 +92,7 @@ class Film:
     def __init__(self, noise: float = 0.0) -> None:
         rng = np.random.default_rng(5)
         codes = rng.integers(1, 65536, (self.rays, 1, 2)).astype(np.uint16)
-        numbers = np.arange(self.rays, dtype=np.int32)
-        views = Views.centred(codes, np.zeros(self.rays, np.int32), numbers, np.zeros((self.rays, 3), np.float32))
-        self.source = StillRays(views)
+        self.source = StillRays(one_each(codes))
         place = (codes[:, 0, :].astype(float) - 1) / hit_codes.SCALE
         self.inside = ((place > 0.37) & (place < 0.53)).all(1)
         self.truth = np.tile(self.usual, (self.frames, self.rays, 1))
@@ -212,8 +209,7 @@ def test_what_is_seen_against_nothing_stays_transparent() -> None:
     codes = rng.integers(1, 65536, (film.rays, 2, 2)).astype(np.uint16)
     alone = rng.random(film.rays) < 0.5
     codes[alone, 1] = 0
-    views = film.source.views
-    film.source = StillRays(Views.centred(codes, views.camera, views.pixel, views.directions))
+    film.source = StillRays(one_each(codes))
     film.images[:] = 255 * film.usual
     film.images[film.moved] = 255 * film.other
     film.images[:, alone] = 0

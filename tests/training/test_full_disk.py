@@ -10,6 +10,7 @@ import torch
 
 from facefolds_core.errors import UserError
 from facefolds_core.model.tensor_files import write_tensors
+from facefolds_core.training.log import log_metrics, open_log
 from facefolds_core.training.segments.forecast import check_space
 from tests.hostile.fuzz_disk import limited_files
 
@@ -36,3 +37,11 @@ def test_a_model_that_would_not_fit_is_not_trained(tmp_path: Path) -> None:
     with pytest.raises(UserError, match="would not fit") as caught:
         check_space(tmp_path / "not" / "there", 1 << 60)
     assert "MB" in str(caught.value)
+
+
+def test_a_log_that_cannot_be_written_is_named(tmp_path: Path) -> None:
+    with open_log(tmp_path / "training") as live:
+        log_metrics(live, 1, {"psnr": 20.0})
+        with limited_files(10), pytest.raises(UserError, match="larger than is allowed") as caught:
+            live.make_summary()
+    assert str(tmp_path / "training") in str(caught.value)

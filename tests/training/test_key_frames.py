@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from facefolds_core.training.likeness import comparable, farthest_first, likenesses
-from facefolds_core.training.segments import keys as keys_module
-from facefolds_core.training.segments.keys import mixture
+from facefolds_core.training.segments import plan
+from facefolds_core.training.segments.plan import mixture
 from tests.scenes import make_scene
 
 LINE = np.array([[0.0], [1.0], [2.0], [3.0], [10.0]], np.float32)
@@ -28,7 +28,7 @@ def test_the_middle_comes_first_then_always_the_farthest() -> None:
 def test_shares_change_without_a_leap(blend: float, monkeypatch: pytest.MonkeyPatch) -> None:
     """Along a line past six key frames, three of which make up a frame."""
     keys = np.arange(6, dtype=np.float32)[:, None] * np.float32(1.3)
-    monkeypatch.setattr(keys_module, "BLEND", blend)
+    monkeypatch.setattr(plan, "BLEND", blend)
     path = [mixture(np.array([x], np.float32), keys) for x in np.linspace(0, 6, 3001)]
     assert np.allclose([shares.sum() for shares in path], 1)
     assert max(np.count_nonzero(shares) for shares in path) <= 3
@@ -39,7 +39,7 @@ def test_a_key_frame_is_itself_or_blended_with_its_neighbours(monkeypatch: pytes
     rows = LINE[:4]
     blended = mixture(rows[1], rows)
     assert blended.argmax() == 1 and 0.4 < blended[1] < 0.95
-    monkeypatch.setattr(keys_module, "BLEND", 0.0)
+    monkeypatch.setattr(plan, "BLEND", 0.0)
     assert mixture(rows[1], rows).tolist() == [0, 1, 0, 0]
 
 

@@ -13,7 +13,7 @@ from facefolds_core.captures.scene import Scene
 from facefolds_core.geometry.chart import Chart
 from facefolds_core.geometry.track import Track
 from facefolds_core.model.radial import RadialManifolds
-from facefolds_core.training.explicit.views import MovingRays, Sampling, first_pixel, trace_views
+from facefolds_core.training.explicit.views import MovingRays, first_pixel, trace_views
 from facefolds_core.training.rays import RaySampler
 from tests.geometry.test_track import about
 from tests.scenes import CENTRE, make_scene
@@ -33,9 +33,8 @@ def layers() -> RadialManifolds:
     return RadialManifolds(Chart((float(CENTRE[0]), 0.0, 0.0)), (-0.6, 0.6, -0.6, 0.6), middle, halfwidth, 3)
 
 
-def rays(scene: Scene, stride: int = 1, share: float = 400.0, reserve: float = 0, **keys: int) -> MovingRays:
-    sampling = Sampling(shares=keys.get("shares", 1000), sample=keys.get("sample", 1))
-    return MovingRays(scene, layers(), stride, share, sampling=sampling, reserve=reserve)
+def rays(scene: Scene, stride: int = 1, share: float = 400.0, reserve: float = 0, shares: int = 1000) -> MovingRays:
+    return MovingRays(scene, layers(), stride, share, shares=shares, sample=1, reserve=reserve)
 
 
 def seen(found: MovingRays, frame: int, parts: int) -> dict[tuple[int, int], tuple[int, ...]]:

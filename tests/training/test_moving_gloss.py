@@ -66,12 +66,6 @@ class Noise:
     def cut(self, index: int) -> np.ndarray:
         return random_cut(np.random.default_rng(index), (6, 24 * 24))
 
-    def shuffle(self, random: np.random.Generator) -> None:
-        """They stay over grey."""
-
-    def average(self) -> None:
-        """They stay over grey."""
-
 
 def test_the_rays_of_a_fit_are_every_so_many_th_of_all_frames_together(scene: Scene) -> None:
     turns = Track.of([about((0, 0, 1), 5.0 * k) for k in range(6)], np.zeros((6, 3)))

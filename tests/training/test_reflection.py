@@ -34,9 +34,9 @@ from facefolds_core.training.explicit.reflection_maps import (
     tilted,
     values_at,
 )
-from facefolds_core.training.explicit.views import Views
 from tests.threads import on_threads
 from tests.training import reference
+from tests.training.rays import one_each
 from tests.training.test_explicit_kernels import random_cut
 
 WINDOW = (-0.5, 0.4, -0.3, 0.6)
@@ -266,6 +266,5 @@ def test_a_ray_reflects_at_the_layer_nearest_to_the_middle() -> None:
     codes[0, :] = 1 + np.arange(5)[:, None] * 1000
     codes[1, [0, 4]] = [[1, 65535], [65535, 1]]
     codes[2, 1:] = codes[0, 1:] * (np.arange(1, 5) != 2)[:, None]
-    views = Views.centred(codes, np.zeros(3, np.int32), np.zeros(3, np.int32), np.eye(3, dtype=np.float32))
-    st = Seen.middle(views, np.eye(3, dtype=np.float32)).st
+    st = Seen.middle(one_each(codes), np.eye(3, dtype=np.float32)).st
     np.testing.assert_allclose(st, [[2000 / 65534] * 2, [0, 1], [1000 / 65534] * 2], atol=1e-6)

@@ -15,7 +15,6 @@ from facefolds_core.files.frame_store import write_frames
 from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.geometry.track import Track
 from facefolds_core.params import ExplicitParams
-from facefolds_core.subject.drawing import draw, view_of
 from facefolds_core.subject.foreign import moved
 from facefolds_core.subject.frames import targets_of
 from facefolds_core.subject.mattes import Mattes
@@ -25,7 +24,8 @@ from facefolds_core.subject.storage import Body
 from facefolds_core.training.explicit.state import TextureState
 from facefolds_core.training.explicit.teacher import Teacher
 from tests.scenes import look_at_origin, make_scene
-from tests.subject.splats import found, some_splats
+from tests.subject.splats import drawn, found
+from tests.subject.splats import some as any_splats
 
 SIZE = 48
 CAMERAS = [look_at_origin(f"c{a}", a, 5, SIZE) for a in (-40, -15, 15, 40)]
@@ -34,16 +34,10 @@ POSES = Track.of([np.eye(3), SIDEWAYS], [[0.0, 0, 0], [0.02, 0.05, 0]])
 
 
 def some() -> Splats:
-    values = some_splats(300)
-    values[:, OPACITY] += 2
-    return Splats(values, np.zeros(3, np.float32))
-
-
-def drawn(splats: Splats, cameras: list) -> NDArray[np.uint8]:
-    """(C, H W, 4) cut-outs."""
-    seen = [draw(splats.values, view_of(camera)).picture() for camera in cameras]
-    whole = [np.concatenate([rgb, 1 - light[..., None]], -1).reshape(-1, 4) for rgb, light in seen]
-    return np.rint(255 * np.clip(whole, 0, 1)).astype(np.uint8)
+    """More of them opaque."""
+    splats = any_splats()
+    splats.values[:, OPACITY] += 2
+    return splats
 
 
 def told(splats: Splats, now: Splats) -> NDArray[np.bool_]:

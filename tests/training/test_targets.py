@@ -15,8 +15,7 @@ from facefolds_core.subject.found import reference_frame
 from facefolds_core.subject.splats import MEAN, Splats
 from facefolds_core.training.explicit import shading_kernel
 from facefolds_core.training.explicit.targets import CutOuts
-from facefolds_core.training.explicit.teacher import OTHERS, Teacher
-from facefolds_core.training.explicit.warnings import MIN_START_PSNR
+from facefolds_core.training.explicit.teacher import MIN_START_PSNR, OTHERS, Teacher
 from tests.scenes import make_scene
 from tests.subject.splats import found
 

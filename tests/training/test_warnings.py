@@ -11,7 +11,7 @@ from facefolds_core.facts import fact
 from facefolds_core.geometry.chart import Chart
 from facefolds_core.subject.volume import Volume
 from facefolds_core.training.explicit.fit import Fit
-from facefolds_core.training.explicit.warnings import warnings_of
+from facefolds_core.training.explicit.loop import warnings_of
 from tests.scenes import make_scene
 
 EMPTY = Volume(np.zeros((2, 2, 2, 4), np.float32), np.zeros(3), 1.0)

@@ -14,11 +14,10 @@ from facefolds_core.captures.scene import Scene
 from facefolds_core.errors import UserError
 from facefolds_core.training.segments import workers
 from facefolds_core.training.segments.base import Base
-from facefolds_core.training.segments.fitting import Fitting
 from facefolds_core.training.segments.forecast import forecast, processes_for
 from facefolds_core.training.segments.loop import base_of
 from facefolds_core.training.segments.plan import Segment, plan_take
-from facefolds_core.training.segments.workers import fit_in_processes
+from facefolds_core.training.segments.workers import Fitting, fit_in_processes
 from tests.training.takes import params
 
 pytestmark = pytest.mark.slow
@@ -33,7 +32,7 @@ class Fit:
         self.place = folder / "checkpoints" / "take"
         self.plan = plan_take(scene, params(), forecast(scene, params()).key_frames or 1)
         self.base: Base = base_of(self.plan, scene, params(), self.place, folder / "log")
-        self.fitting = Fitting(scene, params(), self.base.folder, self.base.fingerprint, self.place)
+        self.fitting = Fitting(scene, params(), self.base.folder, self.place)
         self.done = list[Segment]()
 
     def run(self, tell: Callable[[Segment], object] = lambda segment: None) -> None:

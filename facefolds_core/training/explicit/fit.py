@@ -23,6 +23,7 @@ from facefolds_core.subject.outline import (
     MIN_RADIUS,
     Profile,
     choose_chart,
+    grid_shape,
     profile,
     visible_points,
     whole_window,
@@ -48,6 +49,8 @@ Array = NDArray[np.float64]
 
 FINEST = 0.7
 """Voxels are no smaller than so many pixels of the median camera."""
+LEAST_NODES = 8
+"""Rows and columns of the radius maps, at least."""
 MOVES_MARGIN = 4
 """Nodes of the radius maps around what moves, in which the layers reach as far."""
 MIN_VIEW_SHARE = 0.06
@@ -116,7 +119,7 @@ def fit_scene(scene: Scene, subject: FoundSubject, params: ExplicitParams, other
     surface, notes = trusted_surface(scene, coarse, chart, start)
     vertices = None if surface is None else surface[0].astype(np.float64)
     window = fit_window(coarse, chart, visible, vertices, start)
-    rows, columns = _nodes(window, geometry.nodes)
+    rows, columns = grid_shape(window, geometry.nodes, LEAST_NODES)
     uv = window_uv(window, rows, columns)
     seen = profile(volume, chart, uv, start.subject_opacity)
     opacity = seen.opacity.astype(np.float64)
@@ -250,12 +253,6 @@ def moves(radius: Array, others: Sequence[Array], halfwidth: Array) -> tuple[Arr
 def least_middle(halfwidth: Array, params: GeometryParams) -> Array:
     """The smallest middle radius with which no layer of any round comes nearer to c than `MIN_RADIUS`."""
     return MIN_RADIUS + max(params.rounds) * halfwidth
-
-
-def _nodes(window: Window, longest: int) -> tuple[int, int]:
-    height, width = window[1] - window[0], window[3] - window[2]
-    scale = longest / max(height, width)
-    return max(8, round(scale * height)), max(8, round(scale * width))
 
 
 def extrapolate(radii: Array) -> Array:

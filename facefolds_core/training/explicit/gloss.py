@@ -15,6 +15,7 @@ from facefolds_core.geometry.track import Track
 from facefolds_core.model.reflection import Reflection
 from facefolds_core.params import ReflectionParams
 from facefolds_core.spacing import spread
+from facefolds_core.subject.outline import grid_shape
 from facefolds_core.training.explicit.plan import Level
 from facefolds_core.training.explicit.reflection import (
     GLOSS,
@@ -25,7 +26,7 @@ from facefolds_core.training.explicit.reflection import (
     grounded,
     smoothed,
 )
-from facefolds_core.training.explicit.reflection_maps import Maps, Seen, map_shape, surface_normals
+from facefolds_core.training.explicit.reflection_maps import Maps, Seen, surface_normals
 from facefolds_core.training.explicit.state import TextureState
 from facefolds_core.training.explicit.targets import CutOuts
 from facefolds_core.training.explicit.views import Rays, StillRays, Views
@@ -64,7 +65,7 @@ class GlossFit:
         """New crossings, and perhaps a new middle radius: normals, and what the reflection adds to each ray."""
         if not self.on:
             return
-        radii, shape = middle.cpu().numpy().astype(np.float64), map_shape(self.window, self.params.texels)
+        radii, shape = middle.cpu().numpy().astype(np.float64), grid_shape(self.window, self.params.texels, 2)
         self._normals = surface_normals(radii, self.chart, self.window, shape, self.how.normal_blur)
         if self.maps is not None:
             self.maps = replace(self.maps, surface=self._normals)
@@ -143,7 +144,8 @@ class GlossFit:
         """What textures leave over, on rays for a fit."""
         if self.poses is not None:
             return self._look_in_turns(state, source, pictures, self.poses)
-        views = _views(source)
+        assert isinstance(source, StillRays)
+        views = source.views
         sums = np.zeros((len(views.pixel), 6), np.float32)
         frames = spread(range(len(state.steps)), self.how.frames)
         for frame in frames:
@@ -186,12 +188,6 @@ class GlossFit:
         assert self.maps is not None
         if self.poses is None:
             state.shine = self.maps.added(seen)
-
-
-def _views(source: Rays) -> Views:
-    """The rays of a head that stands still, the same in all frames."""
-    assert isinstance(source, StillRays)
-    return source.views
 
 
 def _seen(state: TextureState, views: Views, pictures: CutOuts, frame: int) -> NDArray[np.float32]:

@@ -12,22 +12,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facefolds_core.captures.scene import Scene, Split
+from facefolds_core.facts import Fact, fact
 from facefolds_core.model.device import CPU
 from facefolds_core.params import ExplicitParams, SubjectParams
 from facefolds_core.progress import progress
 from facefolds_core.subject.find import found_in, subject_in
 from facefolds_core.training.checkpoints import fingerprint
 from facefolds_core.training.explicit.cameras import choose_cameras
-from facefolds_core.training.explicit.fit import fit_scene
+from facefolds_core.training.explicit.fit import Fit, fit_scene
 from facefolds_core.training.explicit.plan import plan
 from facefolds_core.training.explicit.targets import CutOuts
-from facefolds_core.training.explicit.teacher import Teacher
+from facefolds_core.training.explicit.teacher import MIN_START_PSNR, Teacher
 from facefolds_core.training.explicit.trainer import Trainer
 from facefolds_core.training.explicit.views import check_images
-from facefolds_core.training.explicit.warnings import warnings_of
 from facefolds_core.training.log import open_log
-from facefolds_core.training.report import device_name, make_report, peak_memory
-from facefolds_core.training.trained import Trained
+from facefolds_core.training.report import Trained, device_name, make_report, peak_memory
+
+MAX_LOST = 0.05
+"""Largest share of the visible surface without a place in the chart that nobody need be told of."""
 
 
 def fit_explicit(scene: Scene, params: ExplicitParams, log: Path) -> Trained:
@@ -102,3 +104,17 @@ def _fit(scene: Scene, params: ExplicitParams, log: Path) -> tuple[Trained, Surr
     )
     surroundings = Surroundings(cameras.scene.splits, cameras.gains, trainer.usual)
     return Trained(model, spec, report, trainer.summary(spec)), surroundings
+
+
+def warnings_of(scene: Scene, fit: Fit) -> tuple[Fact, ...]:
+    """What a user should look at before believing a training that ended well, one for each thing that is not well; its
+    words say what to do."""
+    found = []
+    if fit.start_psnr < MIN_START_PSNR:
+        found.append(fact("start_explains_little", psnr=fit.start_psnr, under=MIN_START_PSNR))
+    lost = fit.losses[fit.chart]
+    if lost > MAX_LOST:
+        found.append(fact("surface_without_a_place", share=lost, x=fit.chart.centre[0]))
+    if any(line.kind == "front_found" for line in scene.left_out):
+        found.append(fact("front_is_guessed"))
+    return tuple(found)

@@ -22,7 +22,7 @@ ROUND_STRIDE = 8
 """At most every n-th pixel is looked at in the rounds of geometry."""
 
 ROUND_RAYS = 250_000
-"""Rays of all cameras that are looked at in the rounds, at least."""
+"""Rays of all cameras that are looked at in the rounds, at least, if there are as many."""
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,7 @@ def plan(fit: Fit, params: ExplicitParams, frames: int, pixels: int) -> list[Lev
         return max(16, fit.texels[0] // divisor), max(16, fit.texels[1] // divisor)
 
     geometry = params.geometry
-    stride = round_stride(pixels)
+    stride = max(1, min(ROUND_STRIDE, pixels // ROUND_RAYS))
     levels = [Level(size(4), geometry.round_iterations, stride, scale, False) for scale in geometry.rounds]
     rounds, least = geometry.round_iterations * len(levels), params.textures.steps_per_frame * frames
     rest = max(max(params.iterations, params.least_iterations) - rounds, least)
@@ -87,8 +87,3 @@ def plan(fit: Fit, params: ExplicitParams, frames: int, pixels: int) -> list[Lev
     levels.append(Level(size(2), half, 1, geometry.rounds[-1], False, pace))
     levels.append(Level(fit.texels, max(rest - half, frames), 1, geometry.rounds[-1], True, pace))
     return levels
-
-
-def round_stride(pixels: int) -> int:
-    """Every so-manieth of `pixels` is looked at in the rounds: `ROUND_RAYS` of them at least, if there are as many."""
-    return max(1, min(ROUND_STRIDE, pixels // ROUND_RAYS))

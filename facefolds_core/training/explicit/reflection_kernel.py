@@ -9,7 +9,7 @@ import numpy as np
 from numba import prange
 
 from facefolds_core.kernels.hit_codes import SCALE, corner
-from facefolds_core.kernels.jit import inlined, kernel
+from facefolds_core.kernels.jit import compiled, inlined, kernel
 from facefolds_core.training.explicit.shading_kernel import difference, rgb_tap, rgba_tap
 
 
@@ -74,28 +74,29 @@ def _mirrored(st, directions, normals, p):  # type: ignore[no-untyped-def]
 
 
 @kernel(parallel=True)
-def reflect(st, directions, normals, out):  # type: ignore[no-untyped-def]
+def reflect(st, directions, turns, normals, out):  # type: ignore[no-untyped-def]
     """out (P, 2): where in the environment what reflects at st (P, 2), seen along directions (P, 3), lies.
 
+    turns (P, 3, 3) of each ray from its axes to those that the environment is fixed to, None: they are the same.
     normals (h, w, 3). All float32."""
     for p in prange(st.shape[0]):
-        front, left, up = _mirrored(st, directions, normals, p)
+        x, y, z = _mirrored(st, directions, normals, p)
+        front, left, up = _turned(turns, p, x, y, z)
         scale = np.float32(0.5) / np.sqrt(max(2 * (1 + front), np.float32(1e-6)))
         out[p, 0] = np.float32(0.5) + scale * left
         out[p, 1] = np.float32(0.5) - scale * up
 
 
-@kernel(parallel=True)
-def reflect_turned(st, directions, turns, normals, out):  # type: ignore[no-untyped-def]
-    """As `reflect`, with turns (P, 3, 3) of each ray from its axes to those that the environment is fixed to."""
-    for p in prange(st.shape[0]):
-        rx, ry, rz = _mirrored(st, directions, normals, p)
-        front = turns[p, 0, 0] * rx + turns[p, 0, 1] * ry + turns[p, 0, 2] * rz
-        left = turns[p, 1, 0] * rx + turns[p, 1, 1] * ry + turns[p, 1, 2] * rz
-        up = turns[p, 2, 0] * rx + turns[p, 2, 1] * ry + turns[p, 2, 2] * rz
-        scale = np.float32(0.5) / np.sqrt(max(2 * (1 + front), np.float32(1e-6)))
-        out[p, 0] = np.float32(0.5) + scale * left
-        out[p, 1] = np.float32(0.5) - scale * up
+@compiled
+def _turned(turns: Any, p: Any, x: Any, y: Any, z: Any) -> Any:
+    if turns is None:
+        return x, y, z
+    t = turns[p]
+    return (
+        t[0, 0] * x + t[0, 1] * y + t[0, 2] * z,
+        t[1, 0] * x + t[1, 1] * y + t[1, 2] * z,
+        t[2, 0] * x + t[2, 1] * y + t[2, 2] * z,
+    )
 
 
 @kernel(parallel=True)

@@ -16,7 +16,8 @@ from facefolds_core.geometry.sphere_uv import Window, texel_uv
 from facefolds_core.kernels.hit_codes import SCALE
 from facefolds_core.model.reflection import Reflection, ReflectionShape
 from facefolds_core.params import ReflectionParams
-from facefolds_core.training.explicit.reflection_kernel import reflect, reflect_turned, sample
+from facefolds_core.subject.outline import window_uv
+from facefolds_core.training.explicit.reflection_kernel import reflect, sample
 from facefolds_core.training.explicit.views import Views
 
 Array = NDArray[np.float32]
@@ -121,11 +122,8 @@ class Maps:
         """(P, 2) in the environment."""
         out = np.empty((len(seen.st), 2), np.float32)
         st, directions = np.ascontiguousarray(seen.st), np.ascontiguousarray(seen.directions)
-        normals = self.normals
-        if seen.turns is None:
-            reflect(st, directions, normals, out)
-        else:
-            reflect_turned(st, directions, np.ascontiguousarray(seen.turns), normals, out)
+        turns = None if seen.turns is None else np.ascontiguousarray(seen.turns)
+        reflect(st, directions, turns, self.normals, out)
         return out
 
     def added(self, seen: Seen) -> Array:
@@ -159,13 +157,6 @@ class Maps:
         return module
 
 
-def map_shape(window: Window, longest: int) -> tuple[int, int]:
-    """(h, w) of maps with texels as wide as high."""
-    u0, u1, v0, v1 = window
-    scale = longest / max(u1 - u0, v1 - v0)
-    return max(2, round(scale * (u1 - u0))), max(2, round(scale * (v1 - v0)))
-
-
 def tangents(normals: Array) -> tuple[Array, Array]:
     """Two unit tangents (..., 3) at right angles of unit normals (..., 3): +y and +z, turned as +x is to become the
     normal by the shortest way, so that they change slowly; within 4 degrees of -x they are shorter."""
@@ -189,9 +180,7 @@ def surface_normals(
     `blur` nodes."""
     radii = ndimage.gaussian_filter(middle, blur, mode="nearest")
     rows, columns = radii.shape
-    u0, u1, v0, v1 = window
-    uv = np.stack(np.meshgrid(np.linspace(u1, u0, rows), np.linspace(v0, v1, columns), indexing="ij"), -1)
-    points = chart.points(uv, radii)
+    points = chart.points(window_uv(window, rows, columns), radii)
     normals = np.cross(np.gradient(points, axis=0), np.gradient(points, axis=1))
     normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
     h, w = shape

@@ -15,7 +15,7 @@ from scipy import ndimage
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.chart import Chart
 from facefolds_core.geometry.sphere_uv import Window
-from facefolds_core.subject.outline import shells, visible_points
+from facefolds_core.subject.outline import nodes_at, shells, visible_points
 from facefolds_core.subject.volume import Volume
 
 Array = NDArray[np.float64]
@@ -107,14 +107,10 @@ def _beneath(
     volume: Volume, chart: Chart, window: Window, inner: Array, cameras: Sequence[Camera]
 ) -> tuple[NDArray[np.intp], NDArray[np.intp], Array]:
     """Nodes (P,), (P,) and radii (P,) of the points that cameras see beneath the first surface."""
-    rows, columns = inner.shape
-    u0, u1, v0, v1 = window
     uv, radius = chart.uv(visible_points(volume, list(cameras), RAYS))
-    i, j = (u1 - uv[:, 0]) / (u1 - u0) * (rows - 1), (uv[:, 1] - v0) / (v1 - v0) * (columns - 1)
-    there = (i >= 0) & (i <= rows - 1) & (j >= 0) & (j <= columns - 1) & (radius >= LEAST_RADIUS)
-    i, j, radius = np.rint(i[there]).astype(np.intp), np.rint(j[there]).astype(np.intp), radius[there]
+    i, j, within = nodes_at(uv, window, inner.shape)
     lowest = ndimage.minimum_filter(inner, WALL, mode="nearest") - MARGIN * volume.voxel
-    lost = radius < lowest[i, j]
+    lost = within & (radius >= LEAST_RADIUS) & (radius < lowest[i, j])
     return i[lost], j[lost], radius[lost]
 
 

@@ -9,12 +9,12 @@ from contextlib import contextmanager
 import numpy as np
 import torch
 from numpy.typing import NDArray
+from scipy import ndimage
 from torch import Tensor
 
 from facefolds_core.kernels.adam import corrections, decays
 from facefolds_core.params import ExplicitParams
 from facefolds_core.training.explicit import adam_kernel, shading_kernel
-from facefolds_core.training.explicit.clearing import loose
 from facefolds_core.training.explicit.rates import BETAS
 from facefolds_core.training.explicit.reflection_kernel import look
 from facefolds_core.training.explicit.targets import CutOuts
@@ -38,6 +38,15 @@ MIN_LIGHT = 0.002
 
 MIN_ALPHA = 0.002
 """Layers with less alpha are skipped once the textures are at half resolution: speed, half a code of a pixel."""
+
+PATCH_OPACITY = 0.3
+"""Patches of texels that are more opaque, in any frame, are compared by size."""
+
+LEAST_SHARE = 0.02
+"""Of the largest patch: smaller ones go."""
+
+REACH = 3
+"""Width of the soft edge around patches that stay, texels."""
 
 
 def model_bytes(texels: tuple[int, int], layers: int, frames: int) -> int:
@@ -147,29 +156,8 @@ class TextureState:
         Args:
             min_alpha: layers with less are skipped.
         """
-        correct = self._count_step(frame)
-        squares = self._step(views, rays, pictures, frame, min_alpha, rates, correct)
-        if self.believed is not None:
-            self.layers[0, ..., 3].lerp_(self.believed, BELIEF * self.pace)
-        return squares / (3 * len(rays))
-
-    def _count_step(self, frame: int) -> NDArray[np.float32]:
-        """(4,) bias corrections, see `adam_kernel.adam_step`, of one step more on a frame."""
         self.steps[frame] += 1
         static, own = corrections(BETAS, int(self.steps.sum())), corrections(BETAS, int(self.steps[frame]))
-        return np.array([*static, *own], np.float32)
-
-    def _step(
-        self,
-        views: Views,
-        rays: NDArray[np.int64],
-        pictures: CutOuts,
-        frame: int,
-        min_alpha: float,
-        rates: NDArray[np.float32],
-        correct: NDArray[np.float32],
-    ) -> float:
-        """Returns the sum of |C - I|^2."""
         texture = self.activated(frame)
         (h, w), n = self.shape, texture.shape[1]
         squares: float = shading_kernel.shade(
@@ -192,10 +180,12 @@ class TextureState:
             texture.numpy(),
             self.gradient.numpy(),
             rates,
-            correct,
+            np.array([*static, *own], np.float32),
             decays(BETAS),
         )
-        return squares
+        if self.believed is not None:
+            self.layers[0, ..., 3].lerp_(self.believed, BELIEF * self.pace)
+        return squares / (3 * len(rays))
 
     def smooth_alpha(self, frame: int) -> None:
         """Replace the logits of alpha, static and of one frame, by their means over 3 x 3 texels; moments stay."""
@@ -258,3 +248,22 @@ def _resample(values: Tensor, old: tuple[int, int], new: tuple[int, int]) -> Ten
     with on_one_thread():
         image = torch.nn.functional.interpolate(image, size=new, mode="bilinear", align_corners=False)
     return image.permute(0, 2, 3, 1).reshape(len(values), -1, *rest).contiguous()
+
+
+def loose(opacity: NDArray[np.floating]) -> NDArray[np.bool_]:
+    """Where nothing is near a large patch of opacity: rests of the room, or of the subject where one camera saw it.
+    From another side such places are splinters in the air, or fog.
+
+    Args:
+        opacity: (H, W) of all layers together, the most over all frames.
+
+    Returns:
+        (H, W) bool; nowhere if there is no opacity at all.
+    """
+    labels, count = ndimage.label(opacity > PATCH_OPACITY, np.ones((3, 3)))
+    if not count:
+        return np.zeros(opacity.shape, bool)
+    sizes = np.bincount(labels.ravel())
+    sizes[0] = 0
+    large = sizes >= LEAST_SHARE * sizes.max()
+    return np.asarray(~ndimage.maximum_filter(large[labels], 2 * REACH + 1))

@@ -25,10 +25,12 @@ from facefolds_core.subject.splats import Splats
 from facefolds_core.subject.standing import in_part
 from facefolds_core.subject.storage import FoundSubject
 from facefolds_core.subject.virtual import seen_by_few, virtual_cameras
-from facefolds_core.training.explicit.warnings import MIN_START_PSNR
 from facefolds_core.training.likeness import comparable, farthest_first, likenesses
 
 Image = NDArray[np.uint8]
+
+MIN_START_PSNR = 25.0
+"""Least PSNR of the subject's Gaussians over the training pictures, dB, from which on they are believed."""
 
 OTHERS = 2
 """Frames beside that of the start in which it is looked where the surface lies."""

@@ -30,7 +30,7 @@ from facefolds_core.training.explicit.second_surface import LAYERS, second_layer
 from facefolds_core.training.explicit.state import MIN_ALPHA, TextureState, on_one_thread
 from facefolds_core.training.explicit.targets import CutOuts
 from facefolds_core.training.explicit.teacher import Teacher
-from facefolds_core.training.explicit.views import Rays, rays_of
+from facefolds_core.training.explicit.views import MovingRays, Rays, StillRays, trace_views
 from facefolds_core.training.log import log_metrics
 
 ERROR_RATIO, SMOOTHING = 9.0, 0.1
@@ -123,7 +123,8 @@ class Trainer:
         assert self.views is not None
         begun = self.state is None
         if self.state is None:
-            self.state = self._new_state(level.texels)
+            start = torch.from_numpy(self.fit.rgb).float()
+            self.state = TextureState(level.texels, self.layers, self.scene.num_frames, start, self.params)
         elif self.state.shape != level.texels:
             self.state.grow(level.texels)
         self._begin_with_subject(begun or moved, colours=begun)
@@ -134,12 +135,11 @@ class Trainer:
         finest = level.texels if level.stride > 1 else self.fit.texels
         share = self.params.textures.rays_per_texel * finest[0] * finest[1]
         self.geometry, self.stride = level.geometry, level.stride
-        self.views = rays_of(self.scene, self.manifolds(), level.stride, share, self.teacher.virtual)
-
-    def _new_state(self, texels: tuple[int, int]) -> TextureState:
-        start = torch.from_numpy(self.fit.rgb).float()
-        shape = (self.layers, self.scene.num_frames)
-        return TextureState(texels, *shape, start, self.params)
+        args, virtual = (self.scene, self.manifolds(), level.stride), self.teacher.virtual
+        if self.scene.poses is None:
+            self.views = StillRays(trace_views(*args, virtual))
+        else:
+            self.views = MovingRays(*args, share, virtual=virtual)
 
     def _begin_with_subject(self, fill: bool, colours: bool) -> None:
         """Let the layers believe in the opacity of the subject's Gaussians, and begin with it, each frame with its own;
@@ -203,7 +203,8 @@ class Trainer:
                 self.pictures.average()
             else:
                 self.pictures.shuffle(self.random)
-            rates = self._rates(level.pace, i / level.iterations if level.last else 0.0)
+            fall = falling(i / level.iterations if level.last else 0.0)
+            rates = rates_of(level.pace * self.params.textures.learning_rate * fall)
             error = self.state.step(views, rays, self.pictures, frame, min_alpha, rates)
             if not coarse and level.smooths(i, self.params.textures.smooth_every):
                 self.state.smooth_alpha(frame)
@@ -227,9 +228,6 @@ class Trainer:
         assert self.state is not None and self.views is not None
         texels = self.state.shape[0] * self.state.shape[1]
         return max(1, int(self.views.count / (self.params.textures.rays_per_texel * texels)))
-
-    def _rates(self, pace: float, progress: float) -> NDArray[np.float32]:
-        return rates_of(pace * self.params.textures.learning_rate * falling(progress))
 
     def _follow(self) -> None:
         """Frames where they lag behind what moves."""

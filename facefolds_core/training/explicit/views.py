@@ -20,6 +20,7 @@ from facefolds_core.model.radial_kernel import texture_positions
 from facefolds_core.spacing import spread
 from facefolds_core.system.spill import spill_folder, spilled_together
 from facefolds_core.training.explicit.teacher import Virtual
+from facefolds_core.training.rays import nothing_seen
 
 Array = NDArray[np.float64]
 
@@ -49,24 +50,6 @@ class Views:
     camera: NDArray[np.int32]
     pixel: NDArray[np.int32]
     directions: NDArray[np.float32]
-
-    @classmethod
-    def centred(
-        cls,
-        codes: NDArray[np.uint16],
-        camera: NDArray[np.int32],
-        pixel: NDArray[np.int32],
-        directions: NDArray[np.float32],
-    ) -> Views:
-        """Of one ray each."""
-        return cls(
-            codes,
-            np.zeros((0, len(FINER), *codes.shape[1:]), np.uint16),
-            np.full(len(codes), -1, np.int32),
-            camera,
-            pixel,
-            directions,
-        )
 
     @property
     def arrays(self) -> tuple[NDArray[np.uint16], NDArray[np.uint16], *tuple[NDArray[np.int32], ...]]:
@@ -187,17 +170,8 @@ def trace_views(scene: Scene, manifolds: RadialManifolds, stride: int, virtual: 
     cameras = range(tracer.count)
     views = Views.together([tracer.views(k, first_pixel(k, stride), stride, frames, stride == 1) for k in cameras])
     if len(views.pixel) == 0:
-        raise _nothing_seen(scene)
+        raise nothing_seen(scene)
     return views
-
-
-def _nothing_seen(scene: Scene) -> UserError:
-    return UserError(
-        "no pixel of any training camera sees the subject",
-        file=scene.folder / "scene.json",
-        expected="cameras that look at the origin",
-        remedy="check the capture's calibration, and `front` or the head poses",
-    )
 
 
 def check_images(scene: Scene) -> None:
@@ -256,23 +230,10 @@ class StillRays:
         yield self.views
 
 
-@dataclass(frozen=True)
-class Sampling:
-    """How many rays of a turning head are traced, and looked at beforehand.
-
-    Attributes:
-        shares: of a frame's rays that are traced, each as large as a step takes.
-        sample: one ray in so many is looked at to estimate how many meet the subject.
-        frames: in which these are looked at.
-    """
-
-    shares: int = 3
-    sample: int = 64
-    frames: int = 6
-
-
-SAMPLING = Sampling()
-
+SHARES = 3
+"""Of the rays of a turning head's frame that are traced, each as large as a step takes."""
+SAMPLE, SAMPLED_FRAMES = 64, 6
+"""One ray in so many, in so many frames, is looked at to estimate how many meet the subject."""
 RESERVE = 4 << 30
 """Bytes that stay free where traced rays are kept in temporary files. 18 frames of 500 x 768 by 22
 cameras have 10 GB of them, and to trace one takes ten times as long as a step on it."""
@@ -288,8 +249,7 @@ class MovingRays:
         stride: of the pixels that there are, as in `trace_views`.
         share: rays of a share: as many as a step at the finest resolution of these layers takes.
         first: number of the first share of frame 0.
-        sampling: how many shares a frame has in use.
-        reserve: see `RESERVE`.
+        shares, sample, reserve: see `SHARES`, `SAMPLE` and `RESERVE`.
     """
 
     def __init__(
@@ -299,21 +259,22 @@ class MovingRays:
         stride: int,
         share: float,
         first: int = 0,
-        sampling: Sampling = SAMPLING,
         virtual: Virtual | None = None,
+        shares: int = SHARES,
+        sample: int = SAMPLE,
         reserve: float = RESERVE,
     ) -> None:
         self._first, self._stride = first, stride
         self._tracer = Tracer(scene, manifolds, virtual)
         self._kept: dict[tuple[int, int], Views] = {}
         self._reserve, self._told = reserve, False
-        frames = spread(range(scene.num_frames), sampling.frames)
-        found = [len(self._traced(k, 0, sampling.sample).pixel) for k in frames]
-        self.count = sampling.sample * sum(found) // len(found)
+        frames = spread(range(scene.num_frames), SAMPLED_FRAMES)
+        found = [len(self._traced(k, 0, sample).pixel) for k in frames]
+        self.count = sample * sum(found) // len(found)
         if self.count == 0:
-            raise _nothing_seen(scene)
+            raise nothing_seen(scene)
         self.shares = max(1, int(self.count / share))
-        self._used = min(self.shares, sampling.shares)
+        self._used = min(self.shares, shares)
 
     def part(self, frame: int, phase: int, parts: int) -> tuple[Views, NDArray[np.int64]]:
         """See `Rays`. Of the shares of a frame only some are in use, in each frame others."""
@@ -354,20 +315,3 @@ class MovingRays:
 def first_pixel(camera: int, stride: int) -> int:
     """Where every `stride`-th pixel of a camera begins: another one in each of up to `stride` cameras."""
     return camera * (7 if stride % 7 else 5) % stride
-
-
-def rays_of(
-    scene: Scene,
-    manifolds: RadialManifolds,
-    stride: int,
-    share: float,
-    virtual: Virtual | None = None,
-) -> Rays:
-    """The rays of a scene's training cameras, and of virtual ones; for `share` see `MovingRays`.
-
-    Raises:
-        UserError: if no ray of any camera crosses a layer.
-    """
-    if scene.poses is None:
-        return StillRays(trace_views(scene, manifolds, stride, virtual))
-    return MovingRays(scene, manifolds, stride, share, virtual=virtual)

@@ -44,7 +44,6 @@ class Base:
         manifolds: the layers.
         textures: what all frames share; without frames, which `frame` reads.
         surroundings: gains, cameras.
-        fingerprint: of what it was made from.
     """
 
     folder: Path
@@ -52,7 +51,6 @@ class Base:
     manifolds: RadialManifolds
     textures: GridTextures
     surroundings: Surroundings
-    fingerprint: str
 
     def lit(self, params: ReflectionParams) -> Maps | None:
         """The reflection that frames are fitted with: none if the base's layers were trained without."""
@@ -131,10 +129,7 @@ def train_base(scene: Scene, keys: list[int], params: ExplicitParams, folder: Pa
     """Train the key frames at once, and write the base's folder, whole or not at all."""
     trained, found = fit_with_surroundings(part_of(scene, keys), params, log)
     with atomic_folder(folder) as temporary:
-        trained.save(temporary / "model")
-        for path in (temporary / "model").iterdir():
-            path.replace(temporary / path.name)
-        (temporary / "model").rmdir()
+        trained.write(temporary)
         tensors = {
             "gains": torch.from_numpy(np.ascontiguousarray(found.gains)),
             "usual": torch.from_numpy(found.usual),
@@ -143,7 +138,7 @@ def train_base(scene: Scene, keys: list[int], params: ExplicitParams, folder: Pa
         shutil.copytree(log, temporary / LOG)
 
 
-def read_base(folder: Path, fingerprint: str) -> Base:
+def read_base(folder: Path) -> Base:
     """Raises UserError if a file is damaged."""
     spec = read_spec(folder)
     assert isinstance(spec, ExplicitSpec)
@@ -155,7 +150,7 @@ def read_base(folder: Path, fingerprint: str) -> Base:
     tensors, metadata = read_tensors(folder / "surroundings.safetensors", _REMEDY)
     splits = tuple(json.loads(metadata["splits"]))
     surroundings = Surroundings(splits, tensors["gains"].numpy(), tensors["usual"].numpy())
-    return Base(folder, spec, manifolds, shared, surroundings, fingerprint)
+    return Base(folder, spec, manifolds, shared, surroundings)
 
 
 def with_its_cameras(scene: Scene, base: Base) -> Scene:

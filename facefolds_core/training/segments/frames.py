@@ -6,8 +6,6 @@ who fits it. So there are no seams between segments.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import torch
 from numpy.typing import NDArray
@@ -23,20 +21,6 @@ from facefolds_core.training.explicit.state import MIN_ALPHA, TextureState
 from facefolds_core.training.explicit.targets import CutOuts
 from facefolds_core.training.explicit.views import MovingRays, Rays, StillRays, Views, trace_views
 from facefolds_core.training.segments.base import Base
-
-
-@dataclass(frozen=True)
-class FittedFrame:
-    """Attributes:
-    colour, alpha: [H, W, 3] and [H, W, N] float16.
-    psnr: of the rays of the last steps, dB.
-    rays: shaded in all steps.
-    """
-
-    colour: Tensor
-    alpha: Tensor
-    psnr: float
-    rays: int
 
 
 class FrameFitter:
@@ -72,11 +56,17 @@ class FrameFitter:
             self.still = StillRays(views)
             self.state.shine = shine_of(base, params, views) if shine is None else shine
 
-    def fit(self, frame: int, shares: NDArray[np.float64], seed: bytes) -> FittedFrame:
-        """Args:
-        frame: of the scene.
-        shares: of the key frames that it starts from.
-        seed: of the draw of rays; of this frame, so that it is the same in every take.
+    def fit(self, frame: int, shares: NDArray[np.float64], seed: bytes) -> tuple[tuple[Tensor, Tensor, float], int]:
+        """Fit one.
+
+        Args:
+            frame: of the scene.
+            shares: of the key frames that it starts from.
+            seed: of the draw of rays; of this frame, so that it is the same in every take.
+
+        Returns:
+            its colour [H, W, 3] and alpha [H, W, N], float16, and PSNR of the rays of the last steps, dB; and the rays
+            that were shaded in all steps.
 
         Raises:
             UserError: if it diverges.
@@ -94,8 +84,7 @@ class FrameFitter:
         for i in range(steps):
             phases = phases or random.permutation(parts).tolist()
             seen, which = views.part(0, phases.pop(), parts)
-            if self.maps is not None and self.scene.poses is not None:
-                state.shine = self.maps.on_rays(seen, self.scene.poses.at(frame).rotation)
+            self._light(frame, seen)
             errors.append(state.step(seen, which, pictures, 0, MIN_ALPHA, self._rates(i / steps)))
             if i % params.textures.smooth_every == 0:
                 state.smooth_frame(0)
@@ -106,15 +95,19 @@ class FrameFitter:
         psnr = -10 * float(np.log10(max(float(np.mean(errors[-parts:])), 1e-12)))
         h, w = state.shape
         colour, alpha = state.frame_colour[0, 0].view(h, w, 3), state.frame_alpha[0, 0].view(h, w, -1)
-        return FittedFrame(colour.half(), alpha.half(), psnr, rays)
+        return (colour.half(), alpha.half(), psnr), rays
+
+    def _light(self, frame: int, seen: Views) -> None:
+        """What the reflection adds to rays of a frame, if they are others in each frame."""
+        if self.maps is not None and self.scene.poses is not None:
+            self.state.shine = self.maps.on_rays(seen, self.scene.poses.at(frame).rotation)
 
     def _follow(self, frame: int, views: Rays, pictures: CutOuts) -> None:
         """Where the frame does not follow yet what moves."""
         state, found = self.state, self.base.surroundings
 
-        def light(state: TextureState, seen: Views, _: int) -> None:
-            if self.maps is not None and self.scene.poses is not None:
-                state.shine = self.maps.on_rays(seen, self.scene.poses.at(frame).rotation)
+        def light(_: TextureState, seen: Views, __: int) -> None:
+            self._light(frame, seen)
 
         errors = mean_errors(state, views, pictures, 0, light)
         chosen = lagging(errors - found.usual, state.shape, self.params.follow.min_error)

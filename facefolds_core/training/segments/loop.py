@@ -29,14 +29,12 @@ from facefolds_core.training.checkpoints import fingerprint
 from facefolds_core.training.explicit.loop import fit_explicit
 from facefolds_core.training.explicit.views import check_images
 from facefolds_core.training.log import log_metrics, open_log
-from facefolds_core.training.report import TrainingReport, device_name, make_report, peak_memory
+from facefolds_core.training.report import Trained, TrainingReport, device_name, make_report, peak_memory
 from facefolds_core.training.segments.base import LOG, Base, read_base, train_base
 from facefolds_core.training.segments.cache import SegmentCache
-from facefolds_core.training.segments.fitting import Fitting, fit_segment
 from facefolds_core.training.segments.forecast import Forecast, check_forecast, forecast, process_bytes, processes_for
 from facefolds_core.training.segments.plan import Segment, TakePlan, plan_take
-from facefolds_core.training.segments.workers import Used, fit_in_processes
-from facefolds_core.training.trained import Trained
+from facefolds_core.training.segments.workers import Fitting, Used, fit_in_processes, fit_segment
 
 _REMEDY = "run the same command again: finished segments are kept"
 
@@ -97,7 +95,7 @@ class _Take:
         frames = sum(len(segment.frames) for segment in left)
         h, w = base.spec.texels
         processes = processes_for(self.scene, self.params, h * w, len(left), frames) if left else 1
-        fitting = Fitting(self.scene, self.params, base.folder, base.fingerprint, self.folder)
+        fitting = Fitting(self.scene, self.params, base.folder, self.folder)
         total = len(self.plan.segments)
         with (
             open_log(self.log, resume=True) as live,
@@ -194,4 +192,4 @@ def base_of(plan: TakePlan, scene: Scene, params: ExplicitParams, folder: Path, 
         train_base(scene, list(plan.keys), params, place, log)
     shutil.rmtree(log, ignore_errors=True)
     shutil.copytree(place / LOG, log)
-    return read_base(place, plan.base)
+    return read_base(place)

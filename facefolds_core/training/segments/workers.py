@@ -1,4 +1,5 @@
-"""Segments shared out among processes of this machine (loky); those that a lost process had are fitted again."""
+"""Segments fitted and written, in this process or shared out among several of this machine (loky); those that a lost
+process had are fitted again."""
 
 from __future__ import annotations
 
@@ -21,12 +22,13 @@ from loky.process_executor import BrokenProcessPool
 from numpy.typing import NDArray
 from tqdm import tqdm
 
+from facefolds_core.captures.scene import Scene
 from facefolds_core.errors import UserError
+from facefolds_core.params import ExplicitParams
 from facefolds_core.system.processes import end_with_parent, with_threads
 from facefolds_core.training.explicit.views import Views, trace_views
-from facefolds_core.training.segments.base import Base, with_its_cameras
+from facefolds_core.training.segments.base import Base, read_base, with_its_cameras
 from facefolds_core.training.segments.cache import SegmentCache
-from facefolds_core.training.segments.fitting import Fitting, fit_segment
 from facefolds_core.training.segments.frames import FrameFitter, shine_of
 from facefolds_core.training.segments.plan import Segment
 
@@ -34,6 +36,54 @@ RAYS = "rays-"
 """Before the name of a folder, beside the segments, with what all processes map into memory."""
 
 SHINE = "shine"
+
+
+@dataclass(frozen=True)
+class Fitting:
+    """By what segments are fitted.
+
+    Attributes:
+        scene: as it was given to the training.
+        params: of the training.
+        base: its folder.
+        folder: of the segments.
+    """
+
+    scene: Scene
+    params: ExplicitParams
+    base: Path
+    folder: Path
+
+    def fitter(self, views: Views | None = None, shine: NDArray[np.float32] | None = None) -> FrameFitter:
+        """Args: of a still head, if they are known, `views`: crossings of its rays, `shine`: see `FrameFitter`."""
+        base = read_base(self.base)
+        return FrameFitter(with_its_cameras(self.scene, base), base, self.params, views, shine)
+
+
+def fit_segment(
+    segment: Segment, fitter: FrameFitter, cache: SegmentCache, tell: Callable[[], object] = lambda: None
+) -> int:
+    """Fit its frames but for those that are in the cache, and write its file.
+
+    Args:
+        tell: hears of each frame that is done.
+
+    Returns:
+        rays that were shaded.
+
+    Raises:
+        UserError: if a frame diverges.
+    """
+    fitted, rays = [], 0
+    for frame, name, shares in zip(segment.frames, segment.names, segment.shares, strict=True):
+        known = cache.frame(name)
+        if known is None:
+            known, shaded = fitter.fit(frame, np.array(shares), bytes.fromhex(name))
+            rays += shaded
+        fitted.append(known)
+        tell()
+    cache.write(segment.names, fitted)
+    return rays
 
 
 @dataclass
@@ -119,7 +169,7 @@ _made: dict[Path, tuple[FrameFitter, SegmentCache]] = {}
 def _means(fitting: Fitting, rays: Path | None) -> tuple[FrameFitter, SegmentCache]:
     """What fits a take's segments in this process, made once."""
     if fitting.base not in _made:
-        _made[fitting.base] = fitting.fitter(*_taken(rays)), fitting.cache()
+        _made[fitting.base] = fitting.fitter(*_taken(rays)), SegmentCache(fitting.folder)
     return _made[fitting.base]
 
 
