@@ -14,8 +14,8 @@ def spread(items: Sequence[T], most: int, *, ends: bool = True) -> list[T]:
     """At most `most` of the items, evenly spaced and in their order; `range(n)` gives indices.
 
     Args:
-        ends: the first and the last are among them (the first, if one is wanted); otherwise the middle of each of as
-            many equal parts.
+        ends: the first and the last are among them (with `most` of 1 the first alone); otherwise the middle of each
+            of as many equal parts.
     """
     wanted = min(most, len(items))
     if ends:

@@ -33,11 +33,11 @@ from facefolds_core.asset.manifest_extras import Audio, FilmedView, Photo, Pictu
 from facefolds_core.geometry.similarity import Similarity
 
 FORMAT_VERSION, LEAST_VERSION = 4, 3
-"""What is written, and the oldest version whose readers show it right."""
+"""What is written, and the oldest version whose readers show such assets right; `Manifest` has both as literals."""
 REMEDY = "make the asset again (`dvc repro`), or copy it again from where it is whole"
 
 UNSEALED = "0" * 64
-"""In the place of a manifest's own checksum, while that is taken."""
+"""Stands for the manifest's own SHA-256 while that is computed."""
 
 
 class Transform(Part):
@@ -155,7 +155,7 @@ class Reflection(StoredFile):
         width, height: of the PNG.
         uv_window: (u0, u1, v0, v1), what gloss, offset and normals cover of the UV map.
         environment_rect, gloss_rect, offset_rect, normals_rect: in pixels of the PNG.
-        environment_scale, gloss_scale, offset_scale: what code 255 means; code 0 is 0, of the offset its negative.
+        environment_scale, gloss_scale, offset_scale: what code 255 means; code 0 means 0, in the offset -offset_scale.
     """
 
     width: Count

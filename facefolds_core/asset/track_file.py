@@ -1,5 +1,6 @@
-"""The head's poses as a file beside the manifest: ten minutes of them are half a megabyte, and 4.3 as JSON.
+"""The head's poses as a file beside the manifest: ten minutes of them are half a megabyte, and 4.3 MB as JSON.
 
+The players read the same bytes (viewer/src/track.js, engines/).
 `track.bin` has for each frame 7 little-endian float32: the quaternion w, x, y, z, and the translation.
 """
 
@@ -19,10 +20,10 @@ from facefolds_core.geometry.track import Track
 
 TRACK_NAME = "track.bin"
 NUMBERS = 7
-"""Of a pose."""
+"""In a pose."""
 POSE_BYTES = 4 * NUMBERS
 LEAST_BAND = 1e-6
-"""Units."""
+"""Of a torso, units: thinner is no band."""
 
 
 def write_track(folder: Path, track: Track) -> StoredFile:
@@ -61,7 +62,7 @@ def track_problems(manifest: Manifest, data: bytes | None = None) -> list[str]:
     if torso is not None:
         far = max(map(abs, (torso.offset, torso.band, *torso.translation)))
         if entry is None or not torso.torso().sound or torso.band < LEAST_BAND or far > FARTHEST:
-            limits = f"a band of {LEAST_BAND:g} to {FARTHEST:g}"
+            limits = f"a band of at least {LEAST_BAND:g}, nothing beyond {FARTHEST:g}"
             return [f"a torso needs poses, a normal and a quaternion of unit length, {limits}"]
     if entry is not None and entry.bytes != POSE_BYTES * frames:
         return [f"{entry.bytes} bytes are no poses of {POSE_BYTES} for {frames} frames"]

@@ -1,1 +1,1 @@
-
+"""Cameras, poses, meshes, and the charts that give each direction its texture coordinates."""

@@ -1,1 +1,1 @@
-
+"""What `evaluate` measures: pictures against photos, opacity against mattes, change over time."""

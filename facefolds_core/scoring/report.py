@@ -86,7 +86,8 @@ def _training(views: Sequence[TrainingView]) -> dict[str, Any] | None:
     if name is None or not views:
         return None
     worst = min(views, key=lambda view: view.values[name] or 0.0)
-    known = {key: [view.values[key] for view in views if view.values.get(key) is not None] for key in views[0].values}
+    keys = dict.fromkeys(key for view in views for key in view.values)
+    known = {key: [view.values[key] for view in views if view.values.get(key) is not None] for key in keys}
     return {
         "metric": name,
         "images": len(views),

@@ -14,7 +14,7 @@ BEHIND = 5.0
 """dB under the median of the training views from which on one is said to be bad."""
 
 METRICS = ("psnr_any", "psnr_over_plate", "psnr_found")
-"""By which they are compared: the first that all of them have."""
+"""By which they are compared: the first that all of them have, else the last."""
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class TrainingView:
     Attributes:
         camera, frame: their names.
         values: METRICS and the errors of opacity; None where one cannot be had.
-        truth, asset: (H, W, 3) the photo, and the asset over the plate or over black.
+        truth, asset: (H, W, 3) the photo, and the asset over the plate or over the background of `evaluate`.
     """
 
     camera: str
@@ -35,8 +35,10 @@ class TrainingView:
 
 
 def compared_by(views: Sequence[TrainingView]) -> str | None:
-    """The metric by which all of them can be compared."""
-    return next((name for name in METRICS if all(view.values[name] is not None for view in views)), None)
+    """The metric by which they are compared; None if no camera sees the asset. One that does not has no
+    `psnr_found`, and is worse than all others."""
+    name = next((name for name in METRICS if all(view.values[name] is not None for view in views)), METRICS[-1])
+    return name if not views or any(view.values[name] is not None for view in views) else None
 
 
 def bad_views(views: Sequence[TrainingView]) -> list[TrainingView]:
@@ -56,10 +58,10 @@ def warnings_of(views: Sequence[TrainingView]) -> list[Fact]:
         return []
     median = _median(views, name)
     return [
-        fact("training_view_bad", camera=view.camera, frame=view.frame, psnr=view.values[name], median=median)
+        fact("training_view_bad", camera=view.camera, frame=view.frame, psnr=view.values[name] or 0.0, median=median)
         for view in bad
     ]
 
 
 def _median(views: Sequence[TrainingView], name: str) -> float:
-    return float(np.median([view.values[name] or 0.0 for view in views]))
+    return float(np.median([value for view in views if (value := view.values[name]) is not None]))

@@ -1,4 +1,5 @@
-"""What the cameras that the asset was trained on see of it: where it fails there, no held-out figure says why."""
+"""What the cameras that the asset was trained on see of it: a camera on which even the training failed (a wrong
+calibration, say) does not show in scores of held-out ones. `evaluate` keeps the figures in metrics.json."""
 
 from __future__ import annotations
 
@@ -34,8 +35,8 @@ def training_views(scene: Scene, asset: Asset, params: EvaluateParams) -> list[T
 def score(seen: Rendering, truth: Truth, params: EvaluateParams) -> dict[str, float | None]:
     """METRICS, and the errors of opacity against the matte that training may use."""
     plate = None if truth.plate is None else psnr(shown(seen.over(truth.plate)), truth.picture)
-    found = psnr(shown(seen.over(params.background)), truth.picture, seen.opacity)
-    values: dict[str, float | None] = {"psnr_any": None, "psnr_over_plate": plate, "psnr_found": found}
+    where_opaque = psnr(shown(seen.over(params.background)), truth.picture, seen.opacity)
+    values: dict[str, float | None] = {"psnr_any": None, "psnr_over_plate": plate, "psnr_found": where_opaque}
     if truth.matte is None:
         return values
     cutout = Cutout.of(truth.picture, truth.matte, truth.plate)

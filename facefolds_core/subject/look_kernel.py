@@ -1,5 +1,9 @@
-"""Looking at a grid of density and colour: rays through it, outlines from a centre, what lies near layers. Compiled for
-CPUs."""
+"""Looking at a grid of density and colour: rays through it, outlines along a chart's rays, what lies near layers;
+compiled, for `volume.py` and `outline.py` (tests/subject/test_volume.py).
+
+`lower` is the place of voxel (0, 0, 0)'s centre, `voxel` a voxel's side, `step` the length of a step along a ray: all
+in the scene's units.
+"""
 
 from __future__ import annotations
 
@@ -10,8 +14,9 @@ from numba import prange
 
 from facefolds_core.kernels.jit import inlined, kernel
 
-CLEAR, OPAQUE = 1e-4, 1e-3
-"""Samples with less alpha are left out, and so is what lies behind less transmittance."""
+CLEAR, SPENT = 1e-4, 1e-3
+"""Rays with less opacity than the first have no radii, and samples that are hidden have it as least weight, so that
+hidden layers keep the colour of what is in them. Behind less transmittance than the second nothing is looked at."""
 
 
 @inlined
@@ -56,7 +61,7 @@ def value(grid, i, j, k, w, q):  # type: ignore[no-untyped-def]
 
 @inlined
 def sample(grid, x, y, z):  # type: ignore[no-untyped-def]
-    """Optical depth and rgb at voxel coordinates (x, y, z)."""
+    """Optical depth across one voxel, and rgb, at voxel coordinates (x, y, z)."""
     i, j, k, fx, fy, fz = cell(grid, x, y, z)
     w = weights(fx, fy, fz)
     return (
@@ -92,7 +97,7 @@ def render(origins, directions, grid, lower, voxel, step):  # type: ignore[no-un
         near, far = span(o, d, lower, voxel, grid)
         t, red, green, blue = np.float32(1.0), np.float32(0.0), np.float32(0.0), np.float32(0.0)
         s = near + 0.5 * step
-        while s < far and t >= OPAQUE:
+        while s < far and t >= SPENT:
             x = (o[0] + s * d[0] - lower[0]) / voxel
             y = (o[1] + s * d[1] - lower[1]) / voxel
             z = (o[2] + s * d[2] - lower[2]) / voxel
@@ -131,7 +136,7 @@ def profile(grid, lower, voxel, origins, directions, farthest, step, shares):  #
             y = (origins[r, 1] + s * directions[r, 1] - lower[1]) / voxel
             z = (origins[r, 2] + s * directions[r, 2] - lower[2]) / voxel
             inside = min(x, y, z) >= 0 and x <= grid.shape[0] - 1 and y <= grid.shape[1] - 1 and z <= grid.shape[2] - 1
-            if inside and t >= OPAQUE:
+            if inside and t >= SPENT:
                 v0, v1, v2, v3 = sample(grid, x, y, z)
                 a = np.float32(1 - math.exp(-v0 * step / voxel))
                 rgb[r, 0] += t * a * v1

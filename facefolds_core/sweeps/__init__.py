@@ -1,0 +1,1 @@
+"""Tables of DVC's experiments, and keys set for one subject."""

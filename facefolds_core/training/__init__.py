@@ -1,1 +1,1 @@
-
+"""The two trainers; `trainers` picks one by the keys."""

@@ -32,6 +32,15 @@ def test_one_that_is_far_behind_the_others_is_a_warning(psnr: float, bad: list[s
     assert [one.values["camera"] for one in warnings_of(views)] == bad
 
 
+def test_one_that_sees_nothing_of_the_asset_is_the_worst() -> None:
+    """It has no picture where the asset is opaque; the others are compared all the same."""
+    views = [view(name, psnr_found=psnr) for name, psnr in (("a", 30.0), ("b", 31.0), ("c", 10.0), ("d", None))]
+    assert [one.camera for one in bad_views(views)] == ["d", "c"]
+    assert [one.values["median"] for one in warnings_of(views)] == [30.0, 30.0]
+    assert all("dB only" in str(one) for one in warnings_of(views))
+    assert compared_by([view("a", psnr_found=None)]) is None and warnings_of([view("a", psnr_found=None)]) == []
+
+
 def test_all_training_cameras_with_a_photo_are_looked_at(tmp_path: Path) -> None:
     """In the middle frame; by the mattes that training may use, where they are."""
     scene = flat_scene(tmp_path)
