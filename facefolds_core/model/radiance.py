@@ -20,9 +20,6 @@ from facefolds_core.model.textures import TexelGrid, Textures
 RAYS_AT_ONCE = 8192
 """Rays that `render` and `surface_points` work on together: bounds their memory."""
 
-TEXELS_AT_ONCE = 65_536
-"""Likewise for `texture`."""
-
 
 @dataclass(frozen=True)
 class Rendered:
@@ -177,8 +174,8 @@ class RadianceManifolds(nn.Module):
         Returns:
             rgb [M, 3] and alpha [M], in [0, 1].
         """
-        parts = [self.textures.sheet(at, layer, time) for at in uv.split(TEXELS_AT_ONCE)]
-        return torch.cat([p.rgb for p in parts]), torch.cat([p.alpha for p in parts])
+        shown = self.textures.sheet(uv, layer, time)
+        return shown.rgb, shown.alpha
 
 
 def _chunks(*tensors: Tensor) -> list[tuple[Tensor, ...]]:

@@ -92,6 +92,10 @@ def encoded_size(dimensions: int, octaves: int) -> int:
     return dimensions * (1 + 2 * octaves)
 
 
+TEXELS_AT_ONCE = 65_536
+"""Points that `MlpTextures.sheet` works on together: bounds its memory."""
+
+
 class MlpTextures(nn.Module):
     """The paper's texture predictor: an MLP on (encoded (u, v), encoded layer coordinate, frame latent), two branches.
 
@@ -163,8 +167,13 @@ class MlpTextures(nn.Module):
         return torch.lerp(embedding(before, self.latents), embedding(after, self.latents), (time - before)[:, None])
 
     def sheet(self, uv: Tensor, layer: int, time: float) -> Shaded:
-        layers = torch.full((len(uv),), layer, dtype=torch.int64, device=uv.device)
-        return self.shade(uv, layers, torch.full((len(uv),), float(time), dtype=uv.dtype, device=uv.device), None)
+        parts = []
+        for at in uv.split(TEXELS_AT_ONCE):
+            layers = torch.full((len(at),), layer, dtype=torch.int64, device=uv.device)
+            parts.append(
+                self.shade(at, layers, torch.full((len(at),), float(time), dtype=uv.dtype, device=uv.device), None)
+            )
+        return Shaded(torch.cat([part.rgb for part in parts]), torch.cat([part.alpha for part in parts]), None)
 
     def shade(self, uv: Tensor, layer: Tensor, time: Tensor, directions: Tensor | None) -> Shaded:
         encoded = positional_encoding(uv, self.uv_frequencies)

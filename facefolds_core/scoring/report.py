@@ -92,7 +92,7 @@ def _training(views: Sequence[TrainingView]) -> dict[str, Any] | None:
         "metric": name,
         "images": len(views),
         **{key: rounded(sum(of) / len(of)) if of else None for key, of in known.items()},  # type: ignore[arg-type]
-        "worst": {"camera": worst.camera, "frame": worst.frame, "psnr": rounded(worst.values[name])},
+        "worst": {"camera": worst.camera, "frame": worst.frame, "psnr": rounded(worst.values[name] or 0.0)},
         "bad": [view.camera for view in bad_views(views)],
     }
 

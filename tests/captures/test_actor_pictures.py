@@ -32,6 +32,13 @@ def rest() -> Picture:
     return render(frontal(), 0.0)
 
 
+def test_same_arguments_give_the_same_picture(rest: Picture) -> None:
+    again = render(frontal(), 0.0)
+    assert np.array_equal(rest.rgb, again.rgb)
+    assert np.array_equal(rest.opacity, again.opacity)
+    assert np.array_equal(rest.depth, again.depth)
+
+
 def test_a_picture_has_colour_opacity_and_depth_and_the_room_none(rest: Picture) -> None:
     assert (rest.rgb.shape, rest.rgb.dtype) == ((HEIGHT, WIDTH, 3), np.uint8)
     assert rest.opacity.shape == rest.depth.shape == (HEIGHT, WIDTH)

@@ -47,6 +47,10 @@ def test_embree_finds_what_trying_every_triangle_finds() -> None:
     assert 0.3 < (slow.triangle != MISS).mean() < 0.95
     np.testing.assert_array_equal(fast.triangle, slow.triangle)
     np.testing.assert_array_equal(fast.barycentric, slow.barycentric)
+    hit = slow.triangle != MISS
+    points = np.einsum("rk,rkc->rc", slow.barycentric[hit], vertices[faces][slow.triangle[hit]])
+    beyond = brute_force_hits(vertices, faces, points + 1e-6 * directions[hit], directions[hit])
+    assert (beyond.triangle != MISS).mean() > 0.2  # the sheet is folded: some rays cross it more than once
 
 
 def test_barycentric_weights_give_the_point_on_the_ray() -> None:

@@ -30,11 +30,14 @@ Stage = Callable[[SubjectFolders], str]
 STAGES: dict[str, tuple[Stage, tuple[str, ...]]] = {
     "configure": (lambda folders: configure(folders.root.parent), ("../.config", "../.code")),
     **{
-        name: (getattr(import_module(f"facefolds_core.pipeline.{name}"), name), outputs)
+        name: (
+            getattr(import_module(f"facefolds_core.pipeline.{name}"), name),
+            outputs[:1] if name == "train" else outputs,
+        )
         for name, outputs in STAGE_OUTPUTS.items()
     },
 }
-"""Name -> what it does, its outputs."""
+"""Name -> what it does, its outputs; of `train` without its log, whose small files say little of a full disk."""
 PARAMS = """\
 subjects:
   tight:

@@ -79,7 +79,8 @@ def _table(path: Path) -> list[Calibration]:
     for row in rows:
         if None in row or None in row.values():
             message, place = "a line of the table has too few or too many values", f"line {rows.line_num}"
-            raise _wrong(message, file=path, place=place, expected=f"{len(header)} values")
+            count = sum(value is not None for value in row.values()) + len(row.get(None, ())) - (None in row)
+            raise _wrong(message, file=path, place=place, expected=f"{len(header)} values", found=f"{count}")
         cameras.append(_camera(row, path, rows.line_num))
     if not cameras:
         raise _wrong("a table without cameras", file=path, expected="a line a camera")
