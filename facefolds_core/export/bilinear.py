@@ -17,6 +17,12 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Float = NDArray[np.float32]
 
+BLOCK = 64
+"""Texels of a side that are worked out together: far fewer than there are texels have a weight in them."""
+FAINT = 1e-8
+"""Weights below are left out: they fall to a quarter from each texel to the next, and all of them together change no
+code of 255."""
+
 
 def interpolation(positions: Array, size: int) -> Array:
     """(P, size): the weights with which `size` texels along [0, 1] are interpolated at positions (P,), clamped."""
@@ -45,19 +51,40 @@ class Projection:
         target: tuple[int, int],
         box: tuple[float, float, float, float] = (0.0, 1.0, 0.0, 1.0),
     ) -> None:
-        self._rows, self._near_rows = _along(source[0], target[0], box[0], box[1])
-        self._columns, self._near_columns = _along(source[1], target[1], box[2], box[3])
+        rows, self._near_rows = _along(source[0], target[0], box[0], box[1])
+        columns, self._near_columns = _along(source[1], target[1], box[2], box[3])
+        self._rows, self._columns = Bands(rows), Bands(columns)
 
     def __call__(self, image: Float) -> Float:
         """(H, W, C) -> (R, S, C)."""
         h, w, c = image.shape
         half = (self._rows @ image.reshape(h, w * c)).reshape(-1, w, c)
+        whole = self._columns @ half.swapaxes(0, 1).reshape(w, -1)
         around = np.ones((3, 3), np.uint8)
         least, most = (
             extreme(image, around).reshape(h, w, c)[self._near_rows[:, None], self._near_columns]
             for extreme in (cv2.erode, cv2.dilate)
         )
-        return np.asarray(np.clip(np.matmul(self._columns, half), least, most), np.float32)
+        return np.asarray(np.clip(whole.reshape(-1, len(half), c).swapaxes(0, 1), least, most), np.float32)
+
+
+class Bands:
+    """A matrix (R, H) whose rows are clear but for a stretch, in blocks of neighbouring rows: `bands @ values`."""
+
+    def __init__(self, weights: Float) -> None:
+        self._blocks, self._shape = [], weights.shape
+        for first in range(0, len(weights), BLOCK):
+            part = weights[first : first + BLOCK]
+            used = np.flatnonzero((np.abs(part) >= FAINT).any(0))
+            low, high = (int(used[0]), int(used[-1]) + 1) if len(used) else (0, 0)
+            self._blocks.append((first, low, high, np.ascontiguousarray(part[:, low:high])))
+
+    def __matmul__(self, values: Float) -> Float:
+        """(H, M) -> (R, M)."""
+        found = np.empty((self._shape[0], values.shape[1]), np.float32)
+        for first, low, high, part in self._blocks:
+            np.matmul(part, values[low:high], out=found[first : first + len(part)])
+        return found
 
 
 def _along(source: int, target: int, start: float, end: float) -> tuple[Float, NDArray[np.intp]]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from facefolds_core.export.bilinear import Projection, interpolation
+from facefolds_core.export.bilinear import Bands, Projection, _along, interpolation
 
 PLACES = (np.arange(997) + 0.5) / 997
 
@@ -36,6 +36,14 @@ def test_nearer_to_the_picture_than_look_ups(size: int) -> None:
         for texels in (Projection((24, 24), (size, size))(image), looked_up(image, size))
     ]
     assert errors[0] < 0.85 * errors[1]
+
+
+@pytest.mark.parametrize(("source", "target"), [(300, 517), (300, 100), (7, 200), (1, 70)])
+def test_blocks_of_rows_give_what_the_whole_matrix_gives(source: int, target: int) -> None:
+    weights, _ = _along(source, target, 0.1, 0.8)
+    values = np.random.default_rng(1).random((source, 5), np.float32)
+    assert np.abs((Bands(weights) @ values) - weights @ values).max() < 2e-6  # a code of 255 is 4e-3
+    assert (Bands(np.zeros((70, 9), np.float32)) @ np.ones((9, 2), np.float32) == 0).all()
 
 
 def test_the_same_grid_keeps_every_texel() -> None:
