@@ -7,7 +7,7 @@ bytes hold: all for one still, or shared out among the frames, each fitted by it
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
@@ -26,6 +26,7 @@ from facefolds_core.captures.found_scene import found_scene
 from facefolds_core.captures.scene import Scene
 from facefolds_core.files.paths import SubjectFolders
 from facefolds_core.geometry.cameras import Camera
+from facefolds_core.rendering.camera_paths import Eye, camera_of, turntable
 from facefolds_core.rendering.pixels import render
 from facefolds_core.scoring.backgrounds import Cutout, squared_error, worst_patch
 from facefolds_core.scoring.images import cutout_of
@@ -39,8 +40,10 @@ from facefolds_core.subject.splats import Splats
 
 SPLAT_BYTES = 20
 """Of SPZ with view dependence of the first degree: 28, of which gzip leaves 20.5. Scored are unrounded ones."""
-FRAMES, SHOWN = 3, 3
-"""That are looked at, evenly spread; how many times as large pictures are drawn."""
+FRAMES = 3
+"""That are scored, evenly spread."""
+PICTURES, SIZE, FIELD_OF_VIEW = 48, (200, 260), 18.5
+"""Of the film, a turntable in which all frames play; pixels of a pane; degrees."""
 STAGES = ("configure", "train", "sample", "reconstruct", "decimate", "texture", "bake", "compress")
 Array = NDArray[np.float64]
 Look = Callable[[Camera, int], tuple[Array, Array]]
@@ -75,8 +78,9 @@ def splats_of(scene: Scene, frame: int, count: int) -> Splats:
 
 
 def look_at_splats(scene: Scene, frames: list[int], count: int) -> Look:
-    fitted = {frame: splats_of(scene, frame, count) for frame in frames}
-    return lambda camera, frame: _exact(*drawing.render(fitted[frame], camera)[:2])
+    """One frame alone is a still: it is shown for every frame."""
+    fitted = [splats_of(scene, frame, count) for frame in frames]
+    return lambda camera, frame: _exact(*drawing.render(fitted[frame % len(fitted)], camera)[:2])
 
 
 def _exact(rgb: NDArray[np.float32], alpha: NDArray[np.float32]) -> tuple[Array, Array]:
@@ -100,24 +104,27 @@ def scores(look: Look, scene: Scene, truth: dict[tuple[int, int], Cutout]) -> li
     return [f"{np.mean(errors):.1f}", f"{min(patches):.1f}"]
 
 
-def picture(looks: list[Look], scene: Scene, key: tuple[int, int], truth: Cutout) -> Image.Image:
-    """The truth, then each of them, over grey."""
-    shots = [truth.over(0.5)]
-    for look in looks:
-        rgb, alpha = look(scene.camera_in_head(*key), key[1])
-        shots.append(np.clip(rgb + (1 - alpha)[..., None] * 0.5, 0, 1))
-    image = Image.fromarray(np.rint(255 * np.concatenate(shots, 1)).astype(np.uint8))
-    return image.resize((SHOWN * image.width, SHOWN * image.height), Image.Resampling.LANCZOS)
+def film(looks: Sequence[Look], num_frames: int, count: int, size: tuple[int, int]) -> list[Image.Image]:
+    """So many pictures: all of them side by side over grey, turning, while the frames play."""
+    pictures = []
+    for i, eye in enumerate(turntable(Eye(target=(-0.1, 0.0, -0.035)), count, (40, 40))):
+        camera, shots = camera_of(eye, *size, FIELD_OF_VIEW), []
+        for look in looks:
+            rgb, alpha = look(camera, i % num_frames)
+            shots.append(np.clip(rgb + (1 - alpha)[..., None] * 0.5, 0, 1))
+        pictures.append(Image.fromarray(np.rint(255 * np.concatenate(shots, 1)).astype(np.uint8)))
+    return pictures
 
 
 def main(
     subject: Annotated[Path, typer.Argument(help="Folder of the subject, e.g. data/actor: all stages have run.")],
     out: Annotated[Path, typer.Argument(help="Folder for the mesh's run.")],
 ) -> None:
-    """Print the table, and draw docs/images/equal_bytes.jpg."""
+    """Print the table, and film docs/images/equal_bytes.webp."""
     folders = SubjectFolders(subject)
     scene, ours, mesh = found_scene(folders), read_asset(folders.asset), one_layer(folders, out)
-    frames, size = spread(range(scene.num_frames), FRAMES), ours.full.entry.bytes
+    every, size = list(range(scene.num_frames)), ours.full.entry.bytes
+    frames = spread(every, FRAMES)
     still, each = size // SPLAT_BYTES, size // SPLAT_BYTES // scene.num_frames
     rows: dict[str, tuple[int, Look, list[int]]] = {
         f"ours, {ours.num_layers} layers": (size, lambda *view: _exact(*render(ours, *view)), frames),
@@ -125,7 +132,7 @@ def main(
         f"{still:,} splats, a still": (still * SPLAT_BYTES, look_at_splats(scene, frames[:1], still), frames[:1]),
         f"{each:,} splats a frame": (
             scene.num_frames * each * SPLAT_BYTES,
-            look_at_splats(scene, frames, each),
+            look_at_splats(scene, every, each),
             frames,
         ),
     }
@@ -134,9 +141,9 @@ def main(
         for name, (count, look, seen) in rows.items()
     ]
     typer.echo(markdown(["", "bytes", "PSNR over any background, dB", "worst patch, dB"], table))
-    key, truth = list(truths(scene, frames[:1]).items())[-1]
-    looks = [look for _, look, _ in rows.values()]
-    picture(looks, scene, key, truth).save(ROOT / "docs" / "images" / "equal_bytes.jpg", quality=85, optimize=True)
+    first, *others = film([look for _, look, _ in rows.values()], len(every), PICTURES, SIZE)
+    place = ROOT / "docs" / "images" / "equal_bytes.webp"
+    first.save(place, "WEBP", save_all=True, append_images=others, duration=125, loop=0, quality=70, method=6)
 
 
 if __name__ == "__main__":

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from bench.equal_bytes import SHOWN, Look, picture, scores
+from bench.equal_bytes import Look, film, scores
 from facefolds_core.scoring.backgrounds import Cutout
 
 SIDE = 32
@@ -30,8 +30,10 @@ def test_a_hole_costs_over_every_background() -> None:
     assert scores(hole, SCENE, TRUTH)[0] == f"{-10 * np.log10(expected):.1f}"
 
 
-def test_the_picture_has_the_truth_first() -> None:
-    drawn = picture([brighter_by(0.2), brighter_by(0.4)], SCENE, (0, 0), TRUTH[0, 0])
-    assert drawn.size == (3 * SIDE * SHOWN, SIDE * SHOWN)
-    middles = [drawn.getpixel(((i * SIDE + SIDE // 2) * SHOWN, SIDE)) for i in range(3)]
-    assert middles == [(102,) * 3, (153,) * 3, (204,) * 3]
+def test_the_film_plays_all_frames_side_by_side() -> None:
+    dark: Look = lambda camera, frame: (np.full((16, 8, 3), 0.2), np.full((16, 8), 0.5))  # noqa: E731
+    moving: Look = lambda camera, frame: (np.full((16, 8, 3), 0.2 * frame), np.ones((16, 8)))  # noqa: E731
+    drawn = film([moving, dark], 3, 4, (8, 16))
+    assert [picture.size for picture in drawn] == [(16, 16)] * 4
+    assert [picture.getpixel((4, 8)) for picture in drawn] == [(value,) * 3 for value in (0, 51, 102, 0)]
+    assert {picture.getpixel((12, 8)) for picture in drawn} == {(115,) * 3}
