@@ -43,7 +43,7 @@ SPLAT_BYTES = 20
 FRAMES = 3
 """That are scored, evenly spread."""
 PICTURES, SIZE, FIELD_OF_VIEW = 48, (200, 260), 18.5
-"""Of the film, a turntable in which all frames play; pixels of a pane; degrees."""
+"""Of the film, a turntable about the actor's middle in which all frames play; pixels of a pane; degrees."""
 STAGES = ("configure", "train", "sample", "reconstruct", "decimate", "texture", "bake", "compress")
 Array = NDArray[np.float64]
 Look = Callable[[Camera, int], tuple[Array, Array]]

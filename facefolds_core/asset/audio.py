@@ -22,6 +22,8 @@ AAC_FRAME = 1024
 AAC_MIME = 'audio/mp4; codecs="mp4a.40.2"'
 FORMATS = {"format_whitelist": "wav,mov,mp4,m4a,3gp,3g2,mj2,mp3,ogg,flac"}
 """Sound files, none of them able to name another file."""
+FILM_RATE = 48_000
+"""Samples a second of a film's sound: AAC knows no rate above 96 000."""
 LONGER = 60.0
 """Seconds that a sound may go on after its sequence; decoding stops there."""
 
@@ -71,9 +73,11 @@ def write_film_with_sound(path: Path, film: Path, source: Path, sequence: Fracti
         source: the sound, as `encode_sound` writes it.
         sequence: seconds of the sequence: what the sound has beyond them is not heard; after its own end it is still.
         first: seconds of the sequence at which the film begins.
+
+    Raises:
+        UserError: if the sound cannot be read.
     """
-    with av.open(f"file:{source}", container_options=CHECKED | FORMATS) as given:
-        once, rate, layout = _heard_once(given, sequence)
+    once, layout, rate = *_heard_once(source, sequence), FILM_RATE
     with av.open(str(film)) as shown, written(path, "mp4") as made:
         pictures: Any = shown.streams.video[0]
         sound: Any = made.add_stream("aac", rate=rate, layout=layout)
@@ -93,16 +97,20 @@ def write_film_with_sound(path: Path, film: Path, source: Path, sequence: Fracti
         made.mux(sound.encode(None))
 
 
-def _heard_once(given: Any, sequence: Fraction) -> tuple[NDArray[np.float32], int, str]:
-    """(channels, samples) of one sequence, samples a second, layout."""
-    stream = given.streams.audio[0]
-    rate, layout = stream.codec_context.sample_rate, "stereo" if stream.codec_context.channels > 1 else "mono"
-    samples = round(sequence * rate)
-    parts = [part.to_ndarray() for part in _within(given.decode(stream), samples, rate, layout)]
-    once = np.zeros((2 if layout == "stereo" else 1, samples), np.float32)
-    heard = np.concatenate(parts, 1)[:, :samples]
-    once[:, : heard.shape[1]] = heard
-    return once, rate, layout
+def _heard_once(source: Path, sequence: Fraction) -> tuple[NDArray[np.float32], str]:
+    """(channels, samples) of one sequence, still after the sound's end, and their layout."""
+    samples = round(sequence * FILM_RATE)
+    try:
+        with av.open(f"file:{source}", container_options=CHECKED | FORMATS) as given:
+            if not given.streams.audio:
+                raise _unreadable(source, "it has no audio stream")
+            stream = given.streams.audio[0]
+            layout = "stereo" if stream.codec_context.channels > 1 else "mono"
+            parts = [part.to_ndarray() for part in _within(given.decode(stream), samples, FILM_RATE, layout)]
+    except FFmpegError as error:
+        raise _unreadable(source, str(error)) from None
+    heard = np.concatenate([*parts, np.zeros((2 if layout == "stereo" else 1, samples), np.float32)], 1)
+    return heard[:, :samples], layout
 
 
 def _part(once: NDArray[np.float32], start: int, first: int, rate: int, layout: str) -> av.AudioFrame:

@@ -18,10 +18,10 @@ Array = NDArray[np.float64]
 Float = NDArray[np.float32]
 
 BLOCK = 64
-"""Texels of a side that are worked out together: far fewer than there are texels have a weight in them."""
+"""Neighbouring texels that are worked out together: only the texels around them have a weight in them."""
 FAINT = 1e-8
-"""Weights below are left out: they fall to a quarter from each texel to the next, and all of them together change no
-code of 255."""
+"""Weights below are left out: they fall to a quarter from each texel to the next, so all of them together are less than
+float32 rounds (seen: 4e-7 of values in [0, 1])."""
 
 
 def interpolation(positions: Array, size: int) -> Array:
@@ -69,7 +69,7 @@ class Projection:
 
 
 class Bands:
-    """A matrix (R, H) whose rows are clear but for a stretch, in blocks of neighbouring rows: `bands @ values`."""
+    """A matrix `weights` (R, H), nearly 0 but around its diagonal, in blocks of neighbouring rows: `bands @ values`."""
 
     def __init__(self, weights: Float) -> None:
         self._blocks, self._shape = [], weights.shape

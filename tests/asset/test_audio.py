@@ -57,6 +57,17 @@ def test_a_films_sound_goes_with_its_pictures(tmp_path: Path, channels: int) -> 
     assert [value > 0.1 for value in loud] == [False, True] * 3
 
 
+@pytest.mark.parametrize("content", [b"no sound", b""])
+def test_a_film_of_a_sound_that_cannot_be_read_names_it(tmp_path: Path, content: bytes) -> None:
+    sound, film = tmp_path / "audio.m4a", tmp_path / "silent.mp4"
+    sound.write_bytes(content)
+    encode_video(film, [np.full((24, 16), 60, np.uint8)], (16, 16), Fraction(10), CODECS["h264"], {"crf": "20"})
+    with pytest.raises(UserError, match="sound cannot be read"):
+        write_film_with_sound(tmp_path / "film.mp4", film, sound, Fraction(1, 2), Fraction(0))
+    with pytest.raises(UserError, match="no audio stream"):
+        write_film_with_sound(tmp_path / "film.mp4", film, film, Fraction(1, 2), Fraction(0))
+
+
 def test_the_same_bytes_each_time(tmp_path: Path) -> None:
     source = tone(tmp_path / "tone.wav", 0.3)
     for name in ("a.m4a", "b.m4a"):
