@@ -27,7 +27,8 @@ from facefolds_core.subject.fit import fit_pictures
 from facefolds_core.subject.foreign import read_start
 from facefolds_core.subject.found import joined, no_subject, reference_frame
 from facefolds_core.subject.gaussians import GaussianParams
-from facefolds_core.subject.mattes import Key, Mattes
+from facefolds_core.subject.hull import contradicted
+from facefolds_core.subject.mattes import Key, Mattes, Source
 from facefolds_core.subject.splats import Splats
 from facefolds_core.subject.storage import BODY, Body, FoundSubject, read_body, read_found, write_found
 
@@ -47,11 +48,15 @@ class View:
         key: of the picture.
         colours: (H, W, 3) times opacity.
         opacity: (H, W).
+        source: whence its matte is.
+        doubtful: (H, W, 4) where its opacity may be wrong, see `fit.Target`; None where nothing is doubted.
     """
 
     key: Key
     colours: Array
     opacity: Array
+    source: Source
+    doubtful: Array | None = None
 
 
 def frames_looked_at(scene: Scene) -> list[int]:
@@ -90,7 +95,7 @@ def find_subject(
     if not any((view.opacity > 0.5).any() for view in views):
         raise _nothing(scene)
     if start is None:
-        mattes.alone = _fit_alone(scene, views, how, params.seed, begun)
+        mattes.alone = _fit_alone(scene, _doubted(scene, mattes, views, how.ball), how, params.seed, begun)
         views = _views(scene, mattes, keys)
         splats = _fit_alone(scene, views, how, params.seed, mattes.alone)
     else:
@@ -113,7 +118,8 @@ def _agreeing(scene: Scene, mattes: Mattes, keys: Sequence[Key]) -> list[Key]:
 def _fit_alone(scene: Scene, views: Sequence[View], how: GaussianParams, seed: int, begun: Splats | None) -> Splats:
     """Gaussians of the subject cut out of pictures, what floats apart left out."""
     cameras, opacities = [scene.camera_in_head(*view.key) for view in views], [view.opacity for view in views]
-    splats = fit_pictures(cameras, [view.colours for view in views], how, seed, opacities, begun)
+    colours, doubtful = [view.colours for view in views], [view.doubtful for view in views]
+    splats = fit_pictures(cameras, colours, how, seed, opacities, begun, doubtful)
     return splats.part(joined(splats, scene))
 
 
@@ -140,7 +146,20 @@ def gaussian_params(params: SubjectParams, scene: Scene) -> GaussianParams:
 
 def _views(scene: Scene, mattes: Mattes, keys: Sequence[Key]) -> list[View]:
     """Training pictures that agree, with the subject cut out of them."""
-    return [View(key, *mattes.cut(key, mattes.of(key))) for key in _agreeing(scene, mattes, keys)]
+    found = [(key, mattes.of(key)) for key in _agreeing(scene, mattes, keys)]
+    return [View(key, *mattes.cut(key, matte), matte.source) for key, matte in found]
+
+
+def _doubted(scene: Scene, mattes: Mattes, views: Sequence[View], ball: float) -> list[View]:
+    """The views; where all others of its frame contradict what one shows beside a plate, that is doubted."""
+    found = list[View]()
+    for frame in dict.fromkeys(view.key[1] for view in views):
+        those = [view for view in views if view.key[1] == frame]
+        cameras, silhouettes = [scene.camera_in_head(*view.key) for view in those], [v.opacity > 0.5 for v in those]
+        for view, against in zip(those, contradicted(cameras, silhouettes, ball), strict=True):
+            picture = np.dstack([mattes.picture(view.key), np.ones_like(view.opacity)]) * against[..., None]
+            found.append(replace(view, doubtful=picture) if view.source == "plate" else view)
+    return found
 
 
 def judged(scene: Scene, splats: Splats, views: Sequence[View]) -> tuple[CameraFit, float]:

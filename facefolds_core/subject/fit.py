@@ -57,17 +57,24 @@ class Target:
         view: its camera.
         picture: (3, H, W) float32; of a cut-out colours times opacity.
         opacity: (H, W) float32 of the subject, or None where the room is in the picture, too.
+        doubtful: (4, H, W) float32, where it is doubtful whether a cut-out's opacity is right: the picture, and 1, both
+            times how doubtful it is.
     """
 
     view: View
     picture: Array
     opacity: Array | None = None
+    doubtful: Array | None = None
 
-    def over(self, behind: Array) -> Array:
-        """(3, H, W): a cut-out over a colour (3,), else the picture."""
+    def before(self, behind: Array) -> tuple[Array, Array]:
+        """(3, H, W) each: a cut-out over a colour (3,), else the picture; and what is behind: that colour, but where
+        opacity is doubtful the picture itself, before which the subject may be or not."""
+        room = behind[:, None, None]
         if self.opacity is None:
-            return self.picture
-        return np.asarray(self.picture + (1 - self.opacity) * behind[:, None, None], np.float32)
+            return self.picture, room
+        if self.doubtful is not None:
+            room = room * (1 - self.doubtful[3]) + self.doubtful[:3]
+        return np.asarray(self.picture + (1 - self.opacity) * room, np.float32), room
 
 
 def fit_pictures(
@@ -77,6 +84,7 @@ def fit_pictures(
     seed: int = 0,
     opacities: Sequence[Array] | None = None,
     begun: Splats | None = None,
+    doubtful: Sequence[Array | None] | None = None,
 ) -> Splats:
     """Gaussians of some pictures (H, W, 3) float32 in [0, 1]: of the room as well, or of the subject alone.
 
@@ -84,6 +92,7 @@ def fit_pictures(
         opacities: (H, W) in [0, 1] of the subject; its colours times opacity are the pictures then, and it is
             compared over a colour that changes with each step.
         begun: Gaussians to begin with; they get the last steps only, and stay as many.
+        doubtful: (H, W, 4) of a picture where its opacity may be wrong, or None; see `Target`.
     """
     random = np.random.default_rng(seed)
     pixels = sum(picture.shape[0] * picture.shape[1] for picture in pictures)
@@ -101,9 +110,9 @@ def fit_pictures(
         done = step / params.iterations
         size = [share for start, share in params.levels if start <= done][-1]
         if size != level:
-            alphas = [None] * len(cameras) if opacities is None else opacities
-            level = size
-            targets = [target_of(*each, size) for each in zip(cameras, pictures, alphas, strict=True)]
+            nothing, level = [None] * len(cameras), size
+            each = zip(cameras, pictures, opacities or nothing, doubtful or nothing, strict=True)
+            targets = [target_of(*one[:3], size, one[3]) for one in each]
         if not len(order):
             order = random.permutation(len(targets))
         behind = background if opacities is None else random.random(3, np.float32)
@@ -139,7 +148,7 @@ def improve(
     values = state.values.copy()
     values[random.random(len(values)) < params.dropped, OPACITY] = ABSENT
     drawing = draw(values, target.view)
-    wish, wish_light = picture_loss(drawing, target.over(behind), behind, params.structure)
+    wish, wish_light = picture_loss(drawing, *target.before(behind), params.structure)
     gradient, moved = differentiate(values, drawing, wish, wish_light)
     seen = np.diff(drawing.first) > 0
     if chosen is not None:
@@ -182,16 +191,22 @@ def grown(state: State, wanted: int) -> State:
     return state
 
 
-def target_of(camera: Camera, picture: Array, opacity: Array | None, size: float) -> Target:
-    """A picture (H, W, 3) with its opacity (H, W), `size` times as large."""
+def target_of(
+    camera: Camera, picture: Array, opacity: Array | None, size: float, doubtful: Array | None = None
+) -> Target:
+    """A picture (H, W, 3) with its opacity (H, W), `size` times as large; doubtful (H, W, 4), see `Target`."""
     width, height = max(8, round(camera.width * size)), max(8, round(camera.height * size))
     view = view_of(camera.resized(width, height))
-    whole = np.zeros((4, *view.padded), np.float32)
-    whole[:3, :height, :width] = np.moveaxis(_smaller(picture, width, height), -1, 0)
+
+    def padded(image: Array) -> Array:
+        whole = np.zeros((image.shape[2], *view.padded), np.float32)
+        whole[:, :height, :width] = np.moveaxis(_smaller(image, width, height), -1, 0)
+        return whole
+
     if opacity is None:
-        return Target(view, whole[:3])
-    whole[3, :height, :width] = _smaller(opacity, width, height)
-    return Target(view, whole[:3], whole[3])
+        return Target(view, padded(picture))
+    whole = padded(np.dstack([picture, opacity]))
+    return Target(view, whole[:3], whole[3], None if doubtful is None else padded(doubtful))
 
 
 def _smaller(image: Array, width: int, height: int) -> Array:

@@ -20,13 +20,13 @@ def picture_loss(drawing: Drawing, photo: Array, background: Array, structure: f
 
     Args:
         photo: (3, H, W) of whole tiles.
-        background: (3,) RGB.
+        background: (3, H, W) what is behind, or one colour (3, 1, 1).
 
     Returns:
         By the colours over black (3, H, W), and by the transmittance (H, W).
     """
     width, height = drawing.view.size
-    shown = drawing.rgb + drawing.light * background[:, None, None]
+    shown = drawing.rgb + drawing.light * background
     difference = shown - photo
     scale = np.float32(1 / (3 * height * width))
     wish = np.sign(difference) * np.float32((1 - structure) * scale)
@@ -35,7 +35,7 @@ def picture_loss(drawing: Drawing, photo: Array, background: Array, structure: f
         grey = [np.ascontiguousarray(one.mean(0)[part]) for one in (shown, photo)]
         wish[:, part[0], part[1]] -= np.float32(structure * scale) * ssim_gradient(*grey)
     wish[:, height:], wish[:, :, width:] = 0, 0
-    return wish, np.einsum("qhw,q->hw", wish, background)
+    return wish, (wish * background).sum(0)
 
 
 def _smooth(image: NDArray[np.floating]) -> Array:

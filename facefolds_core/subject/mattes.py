@@ -90,7 +90,7 @@ class Mattes:
         self.alone: Splats | None = None
         self._frames, self._plates, self._given = scene.open_frames(), scene.open_plates(), scene.open_mattes()
         self._drawn: tuple[Key, tuple[Array, Array]] | None = None
-        self._drawn_alone: tuple[Splats, Key, Array] | None = None
+        self._drawn_alone: tuple[Splats, Key, tuple[Array, Array]] | None = None
         self._labelled: tuple[Splats, Bool] | None = None
         self._drawing = RLock()
         """Held by the thread that asks Gaussians: their kernels have threads of their own."""
@@ -119,16 +119,20 @@ class Mattes:
         cut = cut_out(picture, start, camera, colours)
         share = agreement(cut, start > 0.5)
         if share < ASKED and self.alone is not None:
-            start = self._alone_in(key)
+            start = self._alone_in(key)[0]
             cut = cut_out(picture, start, camera, colours)
             share = agreement(cut, start > 0.5)
         if share < (ASKED if key[1] == self.body.frame else AGREEING):
             return Matte(_bytes(start), "gaussians", share)
         return Matte(_bytes(softened(picture, cut, start, behind, camera)), "picture", share)
 
+    def picture(self, key: Key) -> Array:
+        """(H, W, 3) in [0, 1]."""
+        return _values(self._frames.image(*key))
+
     def cut(self, key: Key, matte: Matte) -> tuple[Array, Array]:
         """The subject cut out of a picture: its colours (H, W, 3) times opacity, and that, (H, W)."""
-        photo, opacity, plate = _values(self._frames.image(*key)), _values(matte.opacity), None
+        photo, opacity, plate = self.picture(key), _values(matte.opacity), None
         if self._plates is not None and self._plated(key):
             plate = _values(self._plates.image(key[0], 0))
         return np.asarray(cut_from(photo, opacity, plate), np.float32), opacity
@@ -159,20 +163,23 @@ class Mattes:
 
     def _start(self, key: Key) -> Start | None:
         """What Gaussians say beside a plate, once they are known."""
-        first, still = (key[0], reference_frame(self.scene)), self.scene.poses is None
-        if self.alone is None or (still and first not in self._frames):
+        if self.alone is None:
             return None
-        return Start(self._alone_in(key), self._frames.image(*first) if still else None)
+        assert self._plates is not None
+        opacity, colours = self._alone_in(key)
+        plate = _values(self._plates.image(key[0], 0))
+        return Start(opacity, _bytes(colours + (1 - opacity[..., None]) * plate))
 
-    def _alone_in(self, key: Key) -> Array:
-        """(H, W) opacity of the Gaussians that were trained with the subject cut out."""
+    def _alone_in(self, key: Key) -> tuple[Array, Array]:
+        """(H, W) opacity of the Gaussians that were trained with the subject cut out, and (H, W, 3) their colours
+        times that."""
         assert self.alone is not None
         with self._drawing:
             known, same = self._drawn_alone, self._view(key)
             if known is None or known[0] is not self.alone or known[1] != same:
                 there = self._in_frame(self.alone, self._alone_stands(), reference_frame(self.scene), key[1])
                 seen = draw(there.values, view_of(self.scene.camera_in_head(*key))).picture()
-                known = self._drawn_alone = self.alone, same, np.asarray(1 - seen[1])
+                known = self._drawn_alone = self.alone, same, (np.asarray(1 - seen[1]), seen[0])
             return known[2]
 
     @cached_property

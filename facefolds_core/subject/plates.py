@@ -39,7 +39,7 @@ SOLID, DEEP = 0.95, 2
 REACH = 4
 """Deviations of `SPREAD` around the subject that still matter to its blurs."""
 SAME = 3.0
-"""Deviations of noise by which a picture may differ from that of the start where nothing has moved."""
+"""Deviations of noise by which a picture may differ from what the Gaussians show where these are believed."""
 
 
 @dataclass(frozen=True)
@@ -48,15 +48,14 @@ class Start:
 
     Attributes:
         opacity: (H, W) theirs.
-        image: (H, W, 3) the camera's picture in the frame in which they were fitted; None of a head that turns.
+        image: (H, W, 3) what they show over the plate.
     """
 
     opacity: Array
-    image: Image | None = None
+    image: Image
 
     def believed(self, image: Image, noise: float) -> Array:
         """(H, W) in [0, 1] whether a picture looks as theirs does."""
-        assert self.image is not None
         one, two = (cv2.GaussianBlur(part.astype(np.float32), (0, 0), BESIDE) / 255 for part in (image, self.image))
         return np.asarray(np.exp(-0.5 * np.square(np.abs(one - two).max(-1) / (SAME * noise))), np.float32)
 
@@ -102,7 +101,7 @@ def _soft(image: Image, plate: Image, subject: Image, start: Start | None) -> Ar
     unknown = (subject > 0) | (differs & (grown(subject, BEYOND) > 0))
     noise = max(NOISE, noise)
     believed = None
-    if start is not None and start.image is not None:
+    if start is not None:
         believed = start.opacity, start.believed(image, noise)
         same = believed[1] > 0.5
         unknown |= (start.opacity > FAINT) & (believed[1] > FAINT)

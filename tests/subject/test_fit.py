@@ -23,6 +23,7 @@ from facefolds_core.subject.fit import fit_pictures
 from facefolds_core.subject.foreign import moved, read_start
 from facefolds_core.subject.found import background, near_enough, subject_of
 from facefolds_core.subject.gaussians import GaussianParams
+from facefolds_core.subject.hull import contradicted
 from facefolds_core.subject.mattes import Mattes
 from facefolds_core.subject.ply import write_ply
 from facefolds_core.subject.splats import COLOUR, COLUMNS, MEAN, OPACITY, SCALE, TURN, Splats
@@ -211,6 +212,32 @@ def test_of_a_subject_that_is_cut_out_nothing_else_is_explained(scene: Scene) ->
     assert psnr(rgb, 255 * colours[HELD]) > 20
     few = fit_pictures(scene.cameras, colours, PARAMS, 0, opacities, begun=found)  # trained on, and no more of them
     assert len(few) <= len(found) and psnr(render(few, scene.cameras[HELD])[0], 255 * colours[HELD]) > 21
+
+
+def test_a_hole_in_one_silhouette_is_none_where_all_others_contradict_it(scene: Scene) -> None:
+    """Hair before a shelf of its colour: to one camera it looks like the plate."""
+    colours, opacities = cut_outs(scene)
+    silhouettes = [opacity > 0.5 for opacity in opacities]
+    true, wrong = silhouettes[HELD].copy(), 4
+    middle = SIZE // 2
+    hole = np.s_[middle - wrong : middle + wrong, middle - wrong : middle + wrong]
+    picture = np.dstack([colours[HELD], np.ones((SIZE, SIZE))]).astype(np.float32)
+    colours[HELD][hole], opacities[HELD][hole], silhouettes[HELD][hole] = 0, 0, False
+    against = contradicted(scene.cameras, silhouettes, 0.5)
+    assert true[hole].all() and against[HELD][hole].all()
+    assert not (against[HELD] & silhouettes[HELD]).any() and not against[HELD][:4].any()
+    doubtful: list[np.ndarray | None] = [None] * CAMERAS
+    believing = fit_pictures(scene.cameras, colours, PARAMS, 0, opacities)
+    doubtful[HELD] = picture * against[HELD][..., None]
+    doubting = fit_pictures(scene.cameras, colours, PARAMS, 0, opacities, None, doubtful)
+    one, two = (render(splats, scene.cameras[HELD])[1][hole].mean() for splats in (believing, doubting))
+    assert 1 - two < 0.7 * (1 - one)  # seen: 0.045 of 0.091
+
+
+def test_where_too_few_others_look_nothing_is_contradicted(scene: Scene) -> None:
+    silhouettes = [np.ones((SIZE, SIZE), bool) for _ in range(3)]
+    silhouettes[0][20:28, 20:28] = False
+    assert not any(found.any() for found in contradicted(scene.cameras[:3], silhouettes, 0.5))
 
 
 def test_a_file_of_another_program(scene: Scene, splats: Splats, tmp_path: Path) -> None:

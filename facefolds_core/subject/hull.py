@@ -1,0 +1,58 @@
+"""Where one silhouette contradicts all others: shape from silhouettes (Laurentini 1994), one of them left out.
+
+Dark hair before the dark boards of a shelf does not differ from the plate, so its camera takes it for the room. What
+all other cameras cover is then in doubt."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from facefolds_core.geometry.cameras import Camera
+
+Bool = NDArray[np.bool_]
+
+CELLS = 128
+"""Places along a side of the cube in which the subject is looked for."""
+WITNESSES = 3
+"""So many other cameras must cover a place, and none that sees it may not."""
+
+
+def contradicted(cameras: Sequence[Camera], silhouettes: Sequence[Bool], ball: float) -> list[Bool]:
+    """(H, W) of each camera: pixels beyond its silhouette in which a place is seen that all others cover.
+
+    Args:
+        silhouettes: (H, W) of the subject, one a camera.
+        ball: radius about the origin, units, in which the subject is looked for.
+    """
+    side = (np.arange(CELLS) + 0.5) * (2 * ball / CELLS) - ball
+    places = np.stack(np.meshgrid(side, side, side, indexing="ij"), -1).reshape(-1, 3)
+    against, covering = np.zeros(len(places), np.int16), np.zeros(len(places), np.int16)
+    for camera, silhouette in zip(cameras, silhouettes, strict=True):
+        rows, columns, seen = _pixels(camera, places)
+        covered = silhouette[rows, columns]
+        against += seen & ~covered
+        covering += seen & covered
+        kept = against < 2
+        places, against, covering = places[kept], against[kept], covering[kept]
+    places = places[(against == 1) & (covering >= WITNESSES)]
+    found = []
+    for camera, silhouette in zip(cameras, silhouettes, strict=True):
+        rows, columns, seen = _pixels(camera, places)
+        image = np.zeros(silhouette.shape, np.uint8)
+        image[rows[seen], columns[seen]] = 1
+        reach = max(1, round(ball / CELLS * camera.K[0, 0] / float(camera.w2c[2, 3])))
+        square = np.ones((2 * reach + 1, 2 * reach + 1), np.uint8)
+        found.append(np.asarray((cv2.dilate(image, square) > 0) & ~silhouette))
+    return found
+
+
+def _pixels(camera: Camera, places: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.int64], Bool]:
+    """Rows and columns (P,) of the pixels in which places (P, 3) are seen, and whether they are in the picture."""
+    image, depth = camera.project(places)
+    columns, rows = np.floor(np.nan_to_num(image)).clip(-1, 1e6).astype(np.int64).T
+    seen = (depth > 0) & (columns >= 0) & (rows >= 0) & (columns < camera.width) & (rows < camera.height)
+    return np.where(seen, rows, 0), np.where(seen, columns, 0), seen
