@@ -27,7 +27,7 @@ from facefolds_core.subject.fit import fit_pictures
 from facefolds_core.subject.foreign import read_start
 from facefolds_core.subject.found import joined, no_subject, reference_frame
 from facefolds_core.subject.gaussians import GaussianParams
-from facefolds_core.subject.hull import contradicted
+from facefolds_core.subject.hull import contradicted, looks_like
 from facefolds_core.subject.mattes import Key, Mattes, Source
 from facefolds_core.subject.splats import Splats
 from facefolds_core.subject.storage import BODY, Body, FoundSubject, read_body, read_found, write_found
@@ -151,14 +151,17 @@ def _views(scene: Scene, mattes: Mattes, keys: Sequence[Key]) -> list[View]:
 
 
 def _doubted(scene: Scene, mattes: Mattes, views: Sequence[View], ball: float) -> list[View]:
-    """The views; where all others of its frame contradict what one shows beside a plate, that is doubted."""
+    """The views; where all others of its frame contradict what one shows beside a plate, that is doubted if it looks like
+    the subject nearby."""
     found = list[View]()
     for frame in dict.fromkeys(view.key[1] for view in views):
         those = [view for view in views if view.key[1] == frame]
         cameras, silhouettes = [scene.camera_in_head(*view.key) for view in those], [v.opacity > 0.5 for v in those]
         for view, against in zip(those, contradicted(cameras, silhouettes, ball), strict=True):
-            picture = np.dstack([mattes.picture(view.key), np.ones_like(view.opacity)]) * against[..., None]
-            found.append(replace(view, doubtful=picture) if view.source == "plate" else view)
+            picture = mattes.picture(view.key)
+            doubted = np.dstack([picture, np.ones_like(view.opacity)])
+            doubted *= (against & looks_like(picture, view.opacity))[..., None]
+            found.append(replace(view, doubtful=doubted) if view.source == "plate" else view)
     return found
 
 

@@ -10,15 +10,24 @@ from collections.abc import Sequence
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from scipy import ndimage
 
 from facefolds_core.geometry.cameras import Camera
 
+Array = NDArray[np.float32]
 Bool = NDArray[np.bool_]
 
 CELLS = 128
 """Places along a side of the cube in which the subject is looked for."""
 WITNESSES = 3
 """So many other cameras must cover a place, and none that sees it may not."""
+SOLID = 0.95
+"""Opacity from which on a pixel shows the subject's colour."""
+SPREAD, LEAST = 6.0, 0.01
+"""Surroundings whose colours the subject has at a pixel, standard deviation, pixels; where less of them is the
+subject's, those of the nearest pixel count."""
+DEVIATION, DEVIATIONS = 0.02, 3.0
+"""Least standard deviation of these colours; a pixel looks like the subject within so many of them."""
 
 
 def contradicted(cameras: Sequence[Camera], silhouettes: Sequence[Bool], ball: float) -> list[Bool]:
@@ -48,6 +57,25 @@ def contradicted(cameras: Sequence[Camera], silhouettes: Sequence[Bool], ball: f
         square = np.ones((2 * reach + 1, 2 * reach + 1), np.uint8)
         found.append(np.asarray((cv2.dilate(image, square) > 0) & ~silhouette))
     return found
+
+
+def looks_like(picture: Array, opacity: Array) -> Bool:
+    """(H, W) where a picture (H, W, 3) has a colour, in [0, 1], that the subject, of opacity (H, W), has nearby: of few
+    cameras others contradict much of the room.
+    """
+    inside = (opacity > SOLID).astype(np.float32)
+    weight = _near(inside)
+    nearest = ndimage.distance_transform_edt(weight <= LEAST, return_distances=False, return_indices=True)
+    mean, square = (
+        (_near(one * inside[..., None]) / np.maximum(weight, LEAST)[..., None])[tuple(nearest)]
+        for one in (picture, picture**2)
+    )
+    variance = np.maximum(square - mean**2, 0) + DEVIATION**2
+    return np.asarray((np.square(picture - mean) < DEVIATIONS**2 * variance).all(-1))
+
+
+def _near(values: Array) -> Array:
+    return np.asarray(cv2.GaussianBlur(values, (0, 0), SPREAD), np.float32)
 
 
 def _pixels(camera: Camera, places: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.int64], Bool]:

@@ -23,7 +23,7 @@ from facefolds_core.subject.fit import fit_pictures
 from facefolds_core.subject.foreign import moved, read_start
 from facefolds_core.subject.found import background, near_enough, subject_of
 from facefolds_core.subject.gaussians import GaussianParams
-from facefolds_core.subject.hull import contradicted
+from facefolds_core.subject.hull import contradicted, looks_like
 from facefolds_core.subject.mattes import Mattes
 from facefolds_core.subject.ply import write_ply
 from facefolds_core.subject.splats import COLOUR, COLUMNS, MEAN, OPACITY, SCALE, TURN, Splats
@@ -232,6 +232,16 @@ def test_a_hole_in_one_silhouette_is_none_where_all_others_contradict_it(scene: 
     doubting = fit_pictures(scene.cameras, colours, PARAMS, 0, opacities, None, doubtful)
     one, two = (render(splats, scene.cameras[HELD])[1][hole].mean() for splats in (believing, doubting))
     assert 1 - two < 0.7 * (1 - one)  # seen: 0.045 of 0.091
+
+
+def test_a_board_of_hairs_colour_looks_like_the_hair_before_it_but_a_book_does_not() -> None:
+    random, opacity = np.random.default_rng(0), np.zeros((40, 60), np.float32)
+    opacity[:, :30] = 1
+    picture = np.full((40, 60, 3), (0.1, 0.2, 0.7), np.float32)
+    picture[:, :30] = picture[20:, 30:] = (0.25, 0.2, 0.15)
+    picture += random.normal(0, 0.01, picture.shape).astype(np.float32)
+    found = looks_like(picture, opacity)
+    assert found[:, :30].mean() > 0.95 < found[21:, 30:].mean() and not found[:19, 30:].any()
 
 
 def test_where_too_few_others_look_nothing_is_contradicted(scene: Scene) -> None:
