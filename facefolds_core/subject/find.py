@@ -151,7 +151,7 @@ def _views(scene: Scene, mattes: Mattes, keys: Sequence[Key]) -> list[View]:
 
 
 def _doubted(scene: Scene, mattes: Mattes, views: Sequence[View], ball: float) -> list[View]:
-    """The views; where all others of its frame contradict what one shows beside a plate, that is doubted if it looks like
+    """The views; what one shows beside a plate is doubted where all others of its frame contradict it and it looks like
     the subject nearby."""
     found = list[View]()
     for frame in dict.fromkeys(view.key[1] for view in views):
