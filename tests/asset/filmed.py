@@ -51,12 +51,7 @@ def filmed(folder: Path) -> Scene:
     return scene
 
 
-def packaged(
-    folder: Path,
-    scene: Scene,
-    section: dict[str, Any],
-    reflection: ReflectionMaps | None = None,
-) -> None:
+def packaged(folder: Path, scene: Scene, section: dict[str, Any], reflection: ReflectionMaps | None = None) -> None:
     """Package the caps with the section `compress`."""
     store = folder.with_name("textures.arrow")
     textures = write_store(store, np.stack([cap_textures(LAYERS, frame, R) for frame in range(FRAMES)]))

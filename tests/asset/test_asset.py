@@ -13,17 +13,7 @@ from facefolds_core.asset.validation import validate_asset
 from facefolds_core.errors import UserError
 from facefolds_core.files.frame_store import write_frames
 from facefolds_core.geometry.meshes import TexturedMesh
-from tests.assets import (
-    PLAIN,
-    SOURCE,
-    WINDOW,
-    cap_crops,
-    cap_mesh,
-    cap_textures,
-    make_asset,
-    write_asset,
-    write_store,
-)
+from tests.assets import PLAIN, SOURCE, WINDOW, cap_crops, cap_mesh, cap_textures, make_asset, write_asset, write_store
 
 
 @pytest.fixture(scope="module")

@@ -65,10 +65,7 @@ MISTAKES: dict[str, tuple[Callable[[Document], Any], str]] = {
     "uneven": (lambda d: d["nodes"][0].update(scale=[1, 1, 2]), "/nodes/0/scale: uneven"),
     "no extension": (lambda d: d["nodes"][0].pop("extensions"), f"/nodes: none has {NAME}"),
     "lines": (lambda d: d["meshes"][1]["primitives"][1].update(mode=1), "/meshes/1/primitives/1/mode: 1, triangles"),
-    "cut view": (
-        lambda d: d["bufferViews"][-1].update(byteLength=10**8),
-        "/bufferViews/{last}: it ends at byte",
-    ),
+    "cut view": (lambda d: d["bufferViews"][-1].update(byteLength=10**8), "/bufferViews/{last}: it ends at byte"),
     "other node": (
         lambda d: d["animations"][0]["channels"][1]["target"].update(node=1),
         "/animations/0/channels/1/target: not this node's",

@@ -14,14 +14,7 @@ from scipy.ndimage import gaussian_filter
 
 from facefolds_core.asset.codecs import CODECS, Stream
 from facefolds_core.asset.packing import AtlasLayout
-from facefolds_core.asset.video import (
-    Picture,
-    decode_video,
-    encode_video,
-    pack_frame,
-    probe_video,
-    unpack_picture,
-)
+from facefolds_core.asset.video import Picture, decode_video, encode_video, pack_frame, probe_video, unpack_picture
 from facefolds_core.errors import UserError
 from facefolds_core.params import VideoCodec
 from tests.assets import cap_textures

@@ -9,10 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.captures.fixtures import (
-    edit_transforms,
-    write_transforms,
-)
+from tests.captures.fixtures import edit_transforms, write_transforms
 from tests.captures.test_bad_captures import Edit, refused
 
 HUGE = [[1, 0, 0, 10**18], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]

@@ -9,9 +9,7 @@ import pytest
 
 from facefolds_core.captures.images import display_colour, downsample, fit_box
 from facefolds_core.captures.picture import FilePicture
-from tests.captures.fixtures import (
-    save,
-)
+from tests.captures.fixtures import save
 
 
 @pytest.mark.parametrize(

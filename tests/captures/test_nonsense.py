@@ -18,14 +18,7 @@ from facefolds_core.files.paths import SubjectFolders
 from facefolds_core.params import Subject
 from facefolds_core.pipeline.capture import capture
 from facefolds_core.pipeline.normalize import normalize
-from tests.captures.fixtures import (
-    RING,
-    SEGMENT,
-    edit_transforms,
-    save_wav,
-    write_multiface,
-    write_transforms,
-)
+from tests.captures.fixtures import RING, SEGMENT, edit_transforms, save_wav, write_multiface, write_transforms
 from tests.captures.test_bad_captures import refused, run
 from tests.hostile.structured import ODD
 from tests.hostile.watch import within

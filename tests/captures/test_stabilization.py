@@ -10,15 +10,7 @@ import pytest
 
 from facefolds_core.captures.assembly import Plan
 from facefolds_core.params import NormalizeParams
-from tests.captures.fixtures import (
-    HEAD,
-    HEAD_TO_WORLD,
-    VERTICES,
-    head_pose,
-    plan_of,
-    pose_text,
-    write_multiface,
-)
+from tests.captures.fixtures import HEAD, HEAD_TO_WORLD, VERTICES, head_pose, plan_of, pose_text, write_multiface
 
 
 @pytest.fixture(scope="module")

@@ -24,13 +24,7 @@ pytestmark = pytest.mark.slow
     ],
 )
 def test_damage_is_refused_in_words_or_harmless(
-    name: str,
-    count: int,
-    seed: int,
-    refused: int,
-    accepted: int,
-    tmp_path: Path,
-    capfd: pytest.CaptureFixture[str],
+    name: str, count: int, seed: int, refused: int, accepted: int, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     counts = importlib.import_module(f"tests.hostile.fuzz_{name}").run(count, seed, tmp_path)
     assert counts.defects == []

@@ -87,10 +87,7 @@ print(digest.hexdigest())
 
 @pytest.mark.parametrize(
     "stage",
-    [
-        "bake",
-        *(pytest.param(name, marks=pytest.mark.nightly) for name in ("capture", "subject", "train", "decimate")),
-    ],
+    ["bake", *(pytest.param(name, marks=pytest.mark.nightly) for name in ("capture", "subject", "train", "decimate"))],
 )
 def test_the_first_run_equals_later_ones(stage: str, tmp_path: Path) -> None:
     code = FRAME.format(body=textwrap.dedent(SCRIPTS[stage]))
