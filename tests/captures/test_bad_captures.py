@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -16,12 +15,10 @@ from facefolds_core.files.paths import SubjectFolders
 from facefolds_core.params import Subject
 from facefolds_core.pipeline.normalize import normalize
 from tests.captures.fixtures import (
-    HEAD_TO_WORLD,
     SEGMENT,
     VERTICES,
     MultifaceCapture,
     pattern,
-    pose_text,
     save,
     write_multiface,
     write_obj,
@@ -68,9 +65,17 @@ def mesh(suffix: str, change: Callable[[Path], object]) -> Damage:
     return lambda c: change(c.mesh("000003", suffix))
 
 
+def pose(number: int, text: str) -> Damage:
+    return mesh("_transform.txt", lambda p: replace_line(p, number, text))
+
+
 def vertices(change: Callable[[np.ndarray], np.ndarray]) -> Damage:
     """Other vertices in all frames."""
     return lambda c: [change(VERTICES).astype("<f4").tofile(c.mesh(frame, ".bin")) for frame in c.frames]
+
+
+def half_a_camera(c: MultifaceCapture) -> None:
+    c.krt.write_text("\n".join(c.krt.read_text().splitlines()[:12]))
 
 
 def unknown_size(c: MultifaceCapture) -> None:
@@ -88,6 +93,10 @@ def other_count(c: MultifaceCapture) -> None:
 def all_incomplete(c: MultifaceCapture) -> None:
     for camera, frame in zip(("400001", "400002", "400003"), c.frames, strict=True):
         c.image(camera, frame).unlink()
+
+
+def second_segment(c: MultifaceCapture) -> None:
+    (c.root / "images" / "E002_Swallow").mkdir()
 
 
 def folder_to_file(name: str) -> Damage:
@@ -117,12 +126,7 @@ BAD: dict[str, tuple[Damage, str, str, str]] = {
     "KRT: twice": (krt(10, "400001"), "a camera appears twice", "KRT", "lines 10 to 17"),
     "KRT: singular K": (krt(2, "0 0 22"), "singular", "KRT", "camera 400001, lines 1 to 8"),
     "KRT: singular R": (krt(7, "0 0 0 1"), "not a rotation", "KRT", "camera 400001, lines 1 to 8"),
-    "KRT: truncated": (
-        lambda c: c.krt.write_text("\n".join(c.krt.read_text().splitlines()[:12])),
-        "KRT is truncated",
-        "KRT",
-        "line 12, the last one (camera 400002)",
-    ),
+    "KRT: truncated": (half_a_camera, "KRT is truncated", "KRT", "line 12, the last one (camera 400002)"),
     "KRT: missing": (lambda c: c.krt.unlink(), "file not found", "KRT", "which holds KRT"),
     "KRT: empty": (lambda c: c.krt.write_text(""), "KRT is empty", "KRT", "at least one camera"),
     "KRT: binary": (lambda c: c.krt.write_bytes(b"\xff\xfe\x00"), "", "KRT", "UTF-16"),
@@ -139,6 +143,7 @@ BAD: dict[str, tuple[Damage, str, str, str]] = {
     "mask: size": (lambda c: save(c.root / MASK, np.zeros((32, 20), np.uint8)), "different sizes", MASK, "20 x 32"),
     "images: no frame complete": (all_incomplete, "no frame has an image from every camera", "", "400002 lacks 1"),
     "images: a file": (folder_to_file("images"), "not a folder", "images", "a file"),
+    "images: two segments": (second_segment, "none is chosen", "images", f"one of {SEGMENT}, E002_Swallow"),
     "images of a segment: a file": (folder_to_file(f"images/{SEGMENT}"), "no segments", "images", "download some"),
     "meshes: a file": (folder_to_file(MESHES), "not a folder", MESHES, "a file"),
     "mesh: bytes": (mesh(".bin", lambda p: cut(p, 90)), "wrong length", "000003.bin", "90 bytes"),
@@ -146,7 +151,7 @@ BAD: dict[str, tuple[Damage, str, str, str]] = {
     "mesh: empty": (mesh(".bin", lambda p: cut(p, 0)), "wrong length", "000003.bin", "0 bytes"),
     "mesh: nan": (vertices(lambda v: v * np.nan), "damaged tracked mesh", "000003.bin", "8 of them not finite"),
     "mesh: zeros": (vertices(lambda v: 0 * v), "damaged tracked mesh", "000003.bin", "8 of 8 exactly at 0"),
-    "mesh: a tail of zeros": (
+    "mesh: zeros at the end": (
         vertices(lambda v: np.where(np.arange(8)[:, None] < 5, v, 0)),
         "damaged tracked mesh",
         "000003.bin",
@@ -162,31 +167,11 @@ BAD: dict[str, tuple[Damage, str, str, str]] = {
     "mesh: no faces": (mesh(".obj", lambda p: p.write_text("v 1 2 3\n" * 8)), "garbled mesh", ".obj", "0 triangles"),
     "mesh: binary": (mesh(".obj", lambda p: p.write_bytes(b"\xff\x00\xfe")), "not a text file", "000003.obj", ""),
     "mesh: another count": (other_count, "damaged tracked mesh", "000009.obj", "16 vertices"),
-    "pose: word": (
-        mesh("_transform.txt", lambda p: replace_line(p, 2, "0 1 x 0")),
-        "garbled head pose",
-        TRANSFORM,
-        "3 rows of 4 numbers",
-    ),
-    "pose: short": (
-        mesh("_transform.txt", lambda p: replace_line(p, 2, "")),
-        "garbled head pose",
-        TRANSFORM,
-        "3 rows of 4 numbers",
-    ),
-    "pose: nan": (mesh("_transform.txt", lambda p: replace_line(p, 2, "0 nan 0 0")), "not finite", TRANSFORM, "nan"),
-    "pose: 1e300": (
-        mesh("_transform.txt", lambda p: replace_line(p, 1, "1 0 0 1e300")),
-        "beyond sense",
-        TRANSFORM,
-        "1e+300",
-    ),
-    "pose: singular": (
-        mesh("_transform.txt", lambda p: p.write_text(pose_text(0 * HEAD_TO_WORLD, np.ones(3)))),
-        "not a rotation",
-        TRANSFORM,
-        "det R = 0",
-    ),
+    "pose: word": (pose(2, "0 1 x 0"), "garbled head pose", TRANSFORM, "3 rows of 4 numbers"),
+    "pose: short": (pose(2, ""), "garbled head pose", TRANSFORM, "3 rows of 4 numbers"),
+    "pose: nan": (pose(2, "0 nan 0 0"), "not finite", TRANSFORM, "nan"),
+    "pose: 1e300": (pose(1, "1 0 0 1e300"), "beyond sense", TRANSFORM, "1e+300"),
+    "pose: singular": (pose(1, "0 0 0 1"), "not a rotation", TRANSFORM, "det R = 0"),
 }
 
 
@@ -210,11 +195,9 @@ IMAGES: dict[str, tuple[Callable[[Path], object], str]] = {
 @pytest.mark.parametrize(("damage", "message"), IMAGES.values(), ids=IMAGES)
 def test_bad_image(tmp_path: Path, source: str, damage: Callable[[Path], object], message: str) -> None:
     if source == "multiface":
-        path = write_multiface(tmp_path / "c").image("400004", "000006")
-        place = "camera 400004, frame 000006"
+        path, place = write_multiface(tmp_path / "c").image("400004", "000006"), "camera 400004, frame 000006"
     else:
-        write_transforms(tmp_path / "c")
-        path, place = tmp_path / "c" / "images" / "400004.png", "camera 400004"
+        path, place = write_transforms(tmp_path / "c")[0].parent / "images" / "400004.png", "camera 400004"
     damage(path)
     error = refused(tmp_path / "c", source, front=None)
     assert (error.message, error.file) == (message, path)
@@ -252,13 +235,6 @@ def test_choices_that_the_capture_does_not_have(
     assert (message in error.message, words in str(error)) == (True, True)
 
 
-def test_two_segments_and_none_chosen(tmp_path: Path) -> None:
-    write_multiface(tmp_path / "c")
-    (tmp_path / "c" / "images" / "E002_Swallow").mkdir()
-    error = refused(tmp_path / "c", "multiface")
-    assert error.expected == f"one of {SEGMENT}, E002_Swallow"
-
-
 def test_all_cameras_culled_says_their_angles(tmp_path: Path) -> None:
     write_multiface(tmp_path / "c", turn=40)  # the mean head looks past all cameras
     error = refused(tmp_path / "c", "multiface", {"normalize": {"max_azimuth": 5}})
@@ -275,18 +251,6 @@ def test_a_scene_that_is_there_survives_a_failed_run(tmp_path: Path) -> None:
         run(tmp_path / "c", "multiface")
     assert (folders.scene / "scene.json").read_text() == before
     assert sorted(path.name for path in folders.root.iterdir()) == ["scene"]
-
-
-def test_the_front_that_was_found_is_said_before_what_is_left_out(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    path, _ = write_transforms(tmp_path / "c")
-    value = json.loads(path.read_text())
-    value["frames"] += [{**value["frames"][0], "file_path": f"images/none{i}.png"} for i in range(9)]
-    path.write_text(json.dumps(value))
-    run(tmp_path / "c", "transforms")
-    said = capsys.readouterr().out.splitlines()
-    assert "taken to face where most cameras stand" in said[2]
 
 
 def test_it_says_what_was_left_out(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
