@@ -88,10 +88,9 @@ def test_obj_and_bin_hold_the_same_vertices(written: Path) -> None:
     folder = written / "tracked_mesh" / SEGMENT
     lines = (folder / "000002.obj").read_text().splitlines()
     vertices = np.array([line.split()[1:] for line in lines if line.startswith("v ")], float)
-    coordinates = [line for line in lines if line.startswith("vt ")]
     stored = np.frombuffer((folder / "000002.bin").read_bytes(), "<f4").reshape(-1, 3)
     assert np.abs(vertices - stored).max() < 1e-4
-    assert len(coordinates) == len(vertices)
+    assert sum(line.startswith("vt ") for line in lines) == len(vertices)
 
 
 def test_an_interrupted_capture_leaves_nothing(tmp_path: Path) -> None:
@@ -104,9 +103,7 @@ def test_an_interrupted_capture_leaves_nothing(tmp_path: Path) -> None:
 
 
 def test_mesh_lies_on_the_surface() -> None:
-    time = 0.5
-    pose = pose_at(time)
-    distances = [distance(*map(float, vertex), pose) for vertex in tracked_mesh(time).vertices[::7]]
+    distances = [distance(*map(float, vertex), pose_at(0.5)) for vertex in tracked_mesh(0.5).vertices[::7]]
     assert np.abs(distances).max() < 0.1
 
 
@@ -146,35 +143,29 @@ def test_held_out_places_are_inner_views() -> None:
 def test_rig_covers_the_front(cameras: int) -> None:
     views = np.array([view(k, cameras) for k in range(cameras)])
     assert np.abs(views[:, 0]).max() <= 76
-    assert views[:, 1].min() >= -27
-    assert views[:, 1].max() <= 37
+    assert -27 <= views[:, 1].min() <= views[:, 1].max() <= 37
     assert np.all(np.abs(views[:, 2] - 1000) < 20)
 
 
-def _configure(folders: SubjectFolders, source: str, path: Path) -> None:
+def configured(data: Path, source: str, path: Path) -> SubjectFolders:
+    folders = SubjectFolders(data / "anyone")
     write_json(folders.config / "entry.json", {"source": source, "path": str(path)})
     write_json(folders.config / "capture.json", PARAMS.model_dump(mode="json"))
+    return folders
 
 
 def test_stage_generates_the_actor(tmp_path: Path) -> None:
-    folders = SubjectFolders(tmp_path / "data" / "actor")
-    _configure(folders, "actor", tmp_path)
+    folders = configured(tmp_path / "data", "actor", tmp_path)
     assert "6 pictures" in capture(folders)
     assert read_json(folders.capture / "source.json") == {"source": "actor", "path": str(tmp_path)}
     assert (folders.capture / "KRT").is_file()
 
 
-def test_stage_notes_where_another_capture_is(tmp_path: Path) -> None:
-    folders = SubjectFolders(tmp_path / "data" / "other")
-    (tmp_path / "there").mkdir()
-    _configure(folders, "multiface", tmp_path / "there")
-    capture(folders)
-    assert [p.name for p in folders.capture.iterdir()] == ["source.json"]
-
-
-def test_stage_refuses_a_capture_that_is_not_there(tmp_path: Path) -> None:
-    folders = SubjectFolders(tmp_path / "data" / "other")
-    _configure(folders, "multiface", tmp_path / "nowhere")
-    with pytest.raises(UserError, match="nowhere"):
+def test_stage_notes_where_another_capture_is_and_refuses_one_that_is_not_there(tmp_path: Path) -> None:
+    folders = configured(tmp_path / "data", "multiface", tmp_path / "elsewhere")
+    with pytest.raises(UserError, match="elsewhere"):
         capture(folders)
     assert not folders.capture.exists()
+    (tmp_path / "elsewhere").mkdir()
+    capture(folders)
+    assert [p.name for p in folders.capture.iterdir()] == ["source.json"]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 from pathlib import Path
 
@@ -65,28 +64,24 @@ def test_choices_that_it_does_not_allow(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "text", ['{"frames": [{', "", "[]", '{"frames": []}', '{"frames": [3]}', '{"frames": {"a": 1}}']
+    ("text", "place"),
+    [
+        *((text, "") for text in ("", "[]", '{"frames": []}', '{"frames": [3]}', '{"frames": {"a": 1}}')),
+        ('{"frames": [{', "line 1"),
+        ('{\n "frames": [\n  1,\n  2', "line 4"),
+    ],
 )
-def test_garbled_transforms(tmp_path: Path, text: str) -> None:
+def test_garbled_transforms(tmp_path: Path, text: str, place: str) -> None:
     path, _ = write_transforms(tmp_path / "c")
     path.write_text(text)
-    assert refused(tmp_path / "c", "transforms").file == path
-
-
-def test_garbled_json_names_line_and_column(tmp_path: Path) -> None:
-    path, _ = write_transforms(tmp_path / "c")
-    path.write_text(json.dumps({"frames": [1, 2]}, indent=1)[:-3])
-    assert str(refused(tmp_path / "c", "transforms").place).startswith("line ")
-
-
-def test_missing_transforms(tmp_path: Path) -> None:
-    (tmp_path / "c").mkdir()
     error = refused(tmp_path / "c", "transforms")
-    assert error.file == tmp_path / "c"
-    assert "transforms.json" in str(error.expected)
+    assert error.file == path and str(error.place or "").startswith(place)
 
 
-def test_no_image_of_transforms_exists(tmp_path: Path) -> None:
-    write_transforms(tmp_path / "c")
+def test_no_transforms_and_no_image_of_them(tmp_path: Path) -> None:
+    path, _ = write_transforms(tmp_path / "c")
     shutil.rmtree(tmp_path / "c" / "images")
     assert "none of the images" in refused(tmp_path / "c", "transforms").message
+    path.unlink()
+    error = refused(tmp_path / "c", "transforms")
+    assert error.file == tmp_path / "c" and "transforms.json" in str(error.expected)

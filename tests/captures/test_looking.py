@@ -37,10 +37,7 @@ def test_a_multiface_capture_is_told_with_what_it_has_and_lacks(tmp_path: Path) 
     assert "frame 000003: no image from 400001" in text
     assert "  0042-anna:" in lines
     entry = entry_of(lines)
-    assert {key: entry[key] for key in ("source", "path")} == {
-        "source": "multiface",
-        "path": str(tmp_path / "0042 anna"),
-    }
+    assert (entry["source"], entry["path"]) == ("multiface", str(tmp_path / "0042 anna"))
     assert entry["holdout"] in (["400002"], ["400004"])
 
 
@@ -64,8 +61,7 @@ def test_what_cannot_be_used_says_why(tmp_path: Path) -> None:
     capture = write_multiface(tmp_path / "c")
     capture.krt.write_text("400001\n1 2 3\n")
     text = "\n".join(appraise(tmp_path / "c"))
-    assert "it cannot be used as it is:" in text
-    assert "KRT" in text
+    assert "it cannot be used as it is:" in text and "KRT" in text
 
 
 def picture(root: Path, name: str) -> None:
@@ -88,13 +84,10 @@ UNKNOWN = [
 
 @pytest.mark.parametrize(("make", "what", "remedy"), [row[1:] for row in UNKNOWN], ids=[row[0] for row in UNKNOWN])
 def test_a_folder_of_no_known_layout_is_described(tmp_path: Path, make: object, what: str, remedy: str) -> None:
-    root = tmp_path / "any"
-    root.mkdir()
-    make(root)  # type: ignore[operator]
-    assert look(root) == []
-    said = describe(root)
-    assert what in said[0]
-    assert remedy in said[1]
+    make(tmp_path)  # type: ignore[operator]
+    assert look(tmp_path) == []
+    said = describe(tmp_path)
+    assert what in said[0] and remedy in said[1]
 
 
 MARKS = {
@@ -130,32 +123,28 @@ def test_a_part_of_a_capture_leads_to_the_whole(tmp_path: Path) -> None:
     assert str(tmp_path / "c") in said[1]
 
 
-def read(tmp_path: Path, source: str, path: Path) -> None:
-    read_capture(Subject(source=source, path=str(path)), SubjectFolders(tmp_path / "data" / "x"), CaptureParams())
+def refused(tmp_path: Path, source: str, path: Path, remedy: str) -> UserError:
+    """The error that such a subject's capture gives, whose remedy has these words."""
+    with pytest.raises(UserError) as caught:
+        read_capture(Subject(source=source, path=str(path)), SubjectFolders(tmp_path / "data" / "x"), CaptureParams())
+    assert remedy in str(caught.value.remedy)
+    return caught.value
 
 
 def test_a_wrong_source_is_told_from_the_right_one(tmp_path: Path) -> None:
     write_transforms(tmp_path / "c")
-    with pytest.raises(UserError, match="not a capture of source colmap") as caught:
-        read(tmp_path, "colmap", tmp_path / "c")
-    assert "(source: transforms)" in str(caught.value.found)
-    assert caught.value.remedy is not None
-    assert "set `source: transforms`" in caught.value.remedy
+    error = refused(tmp_path, "colmap", tmp_path / "c", "set `source: transforms`")
+    assert "not a capture of source colmap" in error.message and "(source: transforms)" in str(error.found)
 
 
 def test_a_place_above_what_is_meant_is_corrected(tmp_path: Path) -> None:
-    (tmp_path / "Sequence1" / "4x").mkdir(parents=True)
-    (tmp_path / "Sequence1" / "4x" / "calibration.csv").touch()
-    with pytest.raises(UserError) as caught:
-        read(tmp_path, "actorshq", tmp_path / "Sequence1")
-    assert caught.value.remedy is not None
-    assert f"set `path: {tmp_path / 'Sequence1' / '4x'}`" in caught.value.remedy
+    inner = tmp_path / "Sequence1" / "4x"
+    inner.mkdir(parents=True)
+    (inner / "calibration.csv").touch()
+    refused(tmp_path, "actorshq", inner.parent, f"set `path: {inner}`")
 
 
 def test_the_command_prints_it_and_refuses_what_is_not_there(tmp_path: Path) -> None:
     write_multiface(tmp_path / "c")
-    done = CliRunner().invoke(app, ["doctor", str(tmp_path / "c")])
-    assert done.exit_code == 0
-    assert "source: multiface" in done.output
-    done = CliRunner().invoke(app, ["doctor", str(tmp_path / "nowhere")])
-    assert done.exit_code == 1
+    done, failed = (CliRunner().invoke(app, ["doctor", str(tmp_path / name)]) for name in ("c", "nowhere"))
+    assert (done.exit_code, failed.exit_code) == (0, 1) and "source: multiface" in done.output

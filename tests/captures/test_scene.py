@@ -37,22 +37,15 @@ def scene(folder: Path) -> Scene:
 
 
 def test_round_trip_is_exact(tmp_path: Path) -> None:
-    write_scene(scene(tmp_path), tmp_path)
-    back, made = read_scene(tmp_path), scene(tmp_path)
-    assert [
-        np.array_equal(b.K, m.K) and np.array_equal(b.w2c, m.w2c)
-        for b, m in zip(back.cameras, made.cameras, strict=True)
-    ] == [True] * 3
+    track = Track.of([np.eye(3), np.diag([-1.0, -1, 1])], [[0, 0, 0], [0.1, 1 / 3, 0]])
+    made = replace(scene(tmp_path), poses=track)
+    write_scene(made, tmp_path)
+    back = read_scene(tmp_path)
+    for b, m in zip(back.cameras, made.cameras, strict=True):
+        assert np.array_equal(b.K, m.K) and np.array_equal(b.w2c, m.w2c)
     assert (back.splits, back.frame_ids, back.left_out) == (made.splits, made.frame_ids, made.left_out)
     assert np.array_equal(back.times, made.times)
     assert back.from_capture.scale == made.from_capture.scale
-
-
-def test_poses_come_back_exactly(tmp_path: Path) -> None:
-    track = Track.of([np.eye(3), np.diag([-1.0, -1, 1])], [[0, 0, 0], [0.1, 1 / 3, 0]])
-    write_scene(replace(scene(tmp_path), poses=track), tmp_path)
-    back = read_scene(tmp_path)
-    assert back.poses is not None
     assert np.array_equal(back.poses.quaternions, track.quaternions)
     assert np.array_equal(back.poses.translations, track.translations)
 
@@ -81,28 +74,21 @@ def test_a_tracked_mesh_stays_in_its_file(tmp_path: Path) -> None:
     vertices = np.random.default_rng(0).normal(size=(2, 500_000, 3)).astype(np.float32)
     np.savez(tmp_path / "surface.npz", vertices=vertices, faces=np.array([[0, 1, 2]], np.int32))
     found = scene(tmp_path).load_surface()
-    assert found is not None
-    assert np.array_equal(found[0], vertices)
-    assert found[1].tolist() == [[0, 1, 2]]
+    assert np.array_equal(found[0], vertices) and found[1].tolist() == [[0, 1, 2]]
     assert peak_of(lambda: scene(tmp_path).load_surface()) < 6e6  # of 12 MB; a frame's mask of what is finite has 1.5
 
 
-def test_a_byte_that_changed_in_a_tracked_mesh_is_noticed(tmp_path: Path) -> None:
-    vertices = np.ones((2, 100, 3), np.float32)
-    np.savez(tmp_path / "surface.npz", vertices=vertices, faces=np.array([[0, 1, 2]], np.int32))
-    content = bytearray((tmp_path / "surface.npz").read_bytes())
-    content[1000] ^= 1
-    (tmp_path / "surface.npz").write_bytes(content)
-    with pytest.raises(UserError, match="tracked mesh of the scene is damaged"):
-        scene(tmp_path).load_surface()
-
-
-@pytest.mark.parametrize("content", [b"", b"PK\x03\x04 cut short", b"no archive"])
-def test_a_damaged_tracked_mesh_is_refused(tmp_path: Path, content: bytes) -> None:
-    (tmp_path / "surface.npz").write_bytes(content)
+@pytest.mark.parametrize("content", [b"", b"PK\x03\x04 cut short", b"no archive", None], ids=repr)
+def test_a_damaged_tracked_mesh_is_refused(tmp_path: Path, content: bytes | None) -> None:
+    """None: a byte changed within."""
+    path = tmp_path / "surface.npz"
+    np.savez(path, vertices=np.ones((2, 100, 3), np.float32), faces=np.array([[0, 1, 2]], np.int32))
+    data = bytearray(path.read_bytes())
+    data[1000] ^= 1
+    path.write_bytes(data if content is None else content)
     with pytest.raises(UserError, match="tracked mesh of the scene is damaged") as caught:
         scene(tmp_path).load_surface()
-    assert caught.value.file == tmp_path / "surface.npz"
+    assert caught.value.file == path
 
 
 POSE = {"quaternion": [1, 0, 0, 0], "translation": [0, 0, 0]}

@@ -50,9 +50,8 @@ def test_facts_are_those_of_the_index(tmp_path: Path, suffix: str) -> None:
 
 @pytest.mark.parametrize("threads", [1, 4])
 def test_frames_come_in_order_and_equal(tmp_path: Path, threads: int) -> None:
-    source = video(write(tmp_path / "a.mp4"))
     wanted = [0, 3, 4, 11]
-    found = list(source.frames(wanted, "rgb", threads))
+    found = list(video(write(tmp_path / "a.mp4")).frames(wanted, "rgb", threads))
     np.testing.assert_array_equal(found, FRAMES[wanted])
 
 
@@ -120,16 +119,30 @@ def test_colours_of_lossy_video_come_back(tmp_path: Path, matrix: Colorspace | N
         assert 10 * np.log10(255**2 / error) > 44  # 4:2:0 costs the rest; another matrix or range: 30 and less
 
 
-def test_a_video_without_its_end(tmp_path: Path) -> None:
-    path = write(tmp_path / "a.mp4")
+@pytest.mark.parametrize(
+    ("container", "match", "found"),
+    [({}, "cannot read a video", "cut off, or no video"), ({"movflags": "faststart"}, "a video is cut off", "")],
+    ids=["its index, too", "behind its index"],
+)
+def test_a_video_that_is_cut_off(tmp_path: Path, container: dict[str, str], match: str, found: str) -> None:
+    path = write(tmp_path / "a.mp4", container=container)
     path.write_bytes(path.read_bytes()[:-3000])
-    assert "cut off, or no video" in str(refused(path, "cannot read a video").found)
+    assert found in str(refused(path, match).found)
 
 
-def test_a_video_that_is_cut_behind_its_index(tmp_path: Path) -> None:
-    path = write(tmp_path / "a.mp4", container={"movflags": "faststart"})
-    path.write_bytes(path.read_bytes()[:-3000])
-    refused(path, "a video is cut off")
+@pytest.mark.parametrize(
+    ("name", "content", "match"),
+    [
+        ("a.mp4", b"", "cannot read a video"),
+        ("a.mp4", b"no video at all" * 100, "cannot read a video"),
+        ("a.mp4", None, "a video is missing"),
+        ("a.gif", b"GIF89a", "a video of a kind that is not read"),
+    ],
+)
+def test_what_is_no_video(tmp_path: Path, name: str, content: bytes | None, match: str) -> None:
+    if content is not None:
+        (tmp_path / name).write_bytes(content)
+    refused(tmp_path / name, match)
 
 
 def test_damage_within_names_the_frame(tmp_path: Path) -> None:
@@ -157,24 +170,14 @@ def test_a_tag_that_turns_it(tmp_path: Path) -> None:
     assert "90" in str(refused(path, "turns it").found)
 
 
-@pytest.mark.parametrize("content", [b"", b"no video at all" * 100])
-def test_what_is_no_video(tmp_path: Path, content: bytes) -> None:
-    (tmp_path / "a.mp4").write_bytes(content)
-    refused(tmp_path / "a.mp4", "cannot read a video")
-
-
-def test_a_missing_one_and_one_of_another_kind(tmp_path: Path) -> None:
-    refused(tmp_path / "a.mp4", "a video is missing")
-    (tmp_path / "a.gif").write_bytes(b"GIF89a")
-    refused(tmp_path / "a.gif", "a video of a kind that is not read")
-
-
 def several(folder: Path, *made: dict[str, Any]) -> list[Video]:
     return [Video(write(folder / f"{c}.mp4", **keys), f"c{c}") for c, keys in enumerate(made)]
 
 
 def test_videos_that_run_side_by_side(tmp_path: Path) -> None:
+    """Frames that all have may be used."""
     assert check_together(several(tmp_path, {}, {}, {})) == (12, 25)
+    assert check_together(several(tmp_path, {}, {"frames": FRAMES[:10]}, {}), most=8) == (10, 25)
 
 
 @pytest.mark.parametrize(
@@ -189,8 +192,3 @@ def test_one_that_does_not_is_named(tmp_path: Path, odd: dict[str, Any], words: 
     with pytest.raises(UserError, match=words) as caught:
         check_together(several(tmp_path, {}, odd, {}))
     assert "camera c1" in str(caught.value.place)
-
-
-def test_the_frames_that_all_have_may_be_used(tmp_path: Path) -> None:
-    made = several(tmp_path, {}, {"frames": FRAMES[:10]}, {})
-    assert check_together(made, most=8) == (10, 25)
