@@ -37,10 +37,9 @@ def test_pictures_with_jittered_poses_are_one_camera(tmp_path: Path, labels: str
 
 
 def test_a_jittered_focal_length_is_averaged(tmp_path: Path) -> None:
-    camera = film().cameras[0]
-    root = write_film(tmp_path, "{c}/{k}.png", jitter=0, fl_x=camera.K[0, 0] * 1.003)
-    capture = read(root)
-    assert capture.views[0].camera.K[0, 0] == pytest.approx(camera.K[0, 0] * 1.001)
+    f = film().cameras[0].K[0, 0]
+    capture = read(write_film(tmp_path, "{c}/{k}.png", jitter=0, fl_x=f * 1.003))
+    assert capture.views[0].camera.K[0, 0] == pytest.approx(f * 1.001)
 
 
 def test_a_camera_that_moves_is_none_of_several(tmp_path: Path) -> None:
@@ -55,14 +54,12 @@ def test_a_walk_around_a_statue_stays_static(tmp_path: Path) -> None:
 
 def shots(jitter: float, cameras: int) -> list[Shot]:
     """Three frames of cameras 30 degrees apart, in folders."""
-    found = []
-    for c in range(cameras):
+
+    def pose(c: int, k: int) -> np.ndarray:
         angle = np.radians(30 * c)
-        for k in range(3):
-            w2c = np.eye(3, 4)
-            w2c[:, 3] = [np.sin(angle) + jitter * k, 0, np.cos(angle)]
-            found.append(Shot(str(k), f"c{c}", None, w2c))
-    return found
+        return np.column_stack([np.eye(3), [np.sin(angle) + jitter * k, 0, np.cos(angle)]])
+
+    return [Shot(str(k), f"c{c}", None, pose(c, k)) for c in range(cameras) for k in range(3)]
 
 
 def test_two_cameras_that_jitter_are_too_few_to_tell(tmp_path: Path) -> None:
@@ -86,6 +83,5 @@ def test_two_lens_models_of_one_camera_are_refused(tmp_path: Path) -> None:
 def test_a_fisheye_of_transforms_json_has_a_fisheyes_lens(tmp_path: Path, keys: dict[str, object]) -> None:
     write_transforms(tmp_path, k1=0.03, k2=0.006, k3=0.0004, k4=0.0001, **keys)
     view = read(tmp_path).views[0]
-    assert view.lens is not None
     assert view.lens.fisheye
     assert view.lens.coefficients.tolist() == [0.03, 0.006, 0.0004, 0.0001]

@@ -25,7 +25,6 @@ def plans(tmp_path_factory: pytest.TempPathFactory) -> tuple[Plan, Plan]:
 def test_a_stabilised_head_stands_still_in_its_mean_pose(plans: tuple[Plan, Plan]) -> None:
     """The mean is the second frame, whose vertices stay where they were in the world."""
     still, turned = plans
-    assert still.vertices is not None and turned.vertices is not None and turned.scene.poses is not None
     assert np.abs(turned.vertices - turned.vertices[:1]).max() < 1e-6
     assert turned.scene.poses.degrees() == pytest.approx([10, 0, 10], abs=1e-6)
     assert np.abs(still.vertices[1] - turned.vertices[1]).max() < 2e-3  # of 0.3: turns shorten the mean, the box
@@ -67,5 +66,4 @@ def test_meshes_that_stand_in_the_world_tell_the_poses(tmp_path: Path) -> None:
         vertices.astype("<f4").tofile(made.mesh(frame, ".bin"))
         made.mesh(frame, "_transform.txt").write_text(pose_text(rotation, HEAD))
     scene = plan_of(tmp_path / "c").scene
-    assert scene.poses is not None
     assert scene.poses.degrees() == pytest.approx([10, 0, 10], abs=0.3)

@@ -23,6 +23,7 @@ read = Reader("ava256", segment="EXP_a")
 
 WIDTH, HEIGHT = 43, 66  # as 2668 x 4096, to a few thousandths of a percent
 FRAMES = ("000120", "000124", "000128")
+MESHES = "kinematic_tracking/registration_vertices.zip"
 
 
 def truth() -> Film:
@@ -74,21 +75,19 @@ def filmed(tmp_path_factory: pytest.TempPathFactory) -> Path:
         mesh = tracked_mesh(float(time))
         meshes[f"{frame}.ply"] = ply(mesh.vertices, mesh.faces)
     pack(root / "head_pose" / "head_pose.zip", poses)
-    pack(root / "kinematic_tracking" / "registration_vertices.zip", meshes)
+    pack(root / MESHES, meshes)
     return root
 
 
 def test_the_filmed_actor_comes_back_with_its_mesh(filmed: Path, tmp_path: Path) -> None:
-    keys: dict[str, object] = {"segment": "EXP_a", "fps": 30.0}
-    scene = scene_of(filmed, "ava256", tmp_path / "scene", truth().names, **keys)
+    scene = scene_of(filmed, "ava256", tmp_path / "scene", truth().names, segment="EXP_a", fps=30.0)
     check_same(scene, truth(), lossless=False)
-    surface = scene.load_surface()
-    assert surface is not None
+    vertices, faces = scene.load_surface()
     mesh = tracked_mesh(float(frame_times(CaptureParams(frames=3))[1]))
     rotation, translation = head_pose(0.0, 0.0)
     expected = scene.from_capture.apply(mesh.vertices @ rotation.T + translation)
-    assert np.abs(surface[0][1] - expected).max() < 1e-5
-    assert np.array_equal(surface[1], mesh.faces)
+    assert np.abs(vertices[1] - expected).max() < 1e-5
+    assert np.array_equal(faces, mesh.faces)
 
 
 def test_frames_and_rate_are_those_of_the_list(filmed: Path) -> None:
@@ -105,7 +104,6 @@ def test_an_example_by_hand(copied: Path) -> None:
     (view,) = read(copied).views
     assert view.camera.centre == pytest.approx([1, 2, 3])
     assert view.camera.forward == pytest.approx([1, 0, 0])
-    assert view.lens is not None
     assert view.lens.coefficients.tolist() == [-0.07, 0.04, -0.003, 0.003, 0.0]
     expected = [[10000 * 43 / 2668, 0, 21.5], [0, 10010 * 66 / 4096, 33], [0, 0, 1]]
     np.testing.assert_allclose(view.lens.K, expected)
@@ -113,16 +111,11 @@ def test_an_example_by_hand(copied: Path) -> None:
 
 def test_a_mesh_without_faces_takes_them_from_the_topology(copied: Path) -> None:
     mesh = tracked_mesh(0.0)
-    pack(
-        copied / "kinematic_tracking" / "registration_vertices.zip",
-        {f"{frame}.ply": ply(mesh.vertices) for frame in FRAMES},
-    )
-    tracking = read(copied).tracking
-    assert tracking is not None and tracking.faces is None
+    pack(copied / MESHES, {f"{frame}.ply": ply(mesh.vertices) for frame in FRAMES})
+    assert read(copied).tracking.faces is None
     lines = [f"v {x} {y} {z}" for x, y, z in mesh.vertices] + [f"f {a} {b} {c}" for a, b, c in mesh.faces + 1]
     (copied / "face_topology.obj").write_text("\n".join(lines) + "\n")
-    tracking = read(copied).tracking
-    assert tracking is not None and np.array_equal(np.asarray(tracking.faces), mesh.faces)
+    assert np.array_equal(np.asarray(read(copied).tracking.faces), mesh.faces)
 
 
 def test_without_tracking_there_is_none(copied: Path) -> None:
@@ -133,8 +126,7 @@ def test_without_tracking_there_is_none(copied: Path) -> None:
 
 def test_cameras_and_frames_that_are_missing_are_said(copied: Path) -> None:
     (copied / "image" / "camA001.zip").unlink()
-    first = avif(truth().images[2, 0])
-    pack(copied / "image" / "camA002.zip", {"camA002/000120.avif": first})
+    pack(copied / "image" / "camA002.zip", {"camA002/000120.avif": avif(truth().images[2, 0])})
     capture = read(copied)
     assert [view.name for view in capture.views] == ["A000", "A002", "A003", "A004"]
     assert "camera A001: calibrated, but has no pictures" in map(str, capture.left_out)
@@ -144,13 +136,6 @@ def test_cameras_and_frames_that_are_missing_are_said(copied: Path) -> None:
 @pytest.mark.parametrize(("segment", "words"), [(None, "several segments"), ("EXP_c", "no such segment")])
 def test_the_segment_must_be_one(filmed: Path, segment: str | None, words: str) -> None:
     read.refused(filmed, words, "one of EXP_a, EXP_b", segment=segment)
-
-
-def change_calibration(root: Path, change: Callable[[list[dict[str, Any]]], Any]) -> None:
-    path = root / "camera_calibration.json"
-    value = json.loads(path.read_text())
-    change(value["KRT"])
-    path.write_text(json.dumps(value))
 
 
 @pytest.mark.parametrize(
@@ -165,8 +150,11 @@ def change_calibration(root: Path, change: Callable[[list[dict[str, Any]]], Any]
     ],
 )
 def test_a_garbled_calibration(copied: Path, change: Callable[[list[dict[str, Any]]], Any], words: str) -> None:
-    change_calibration(copied, change)
-    read.refused(copied, words, copied / "camera_calibration.json")
+    path = copied / "camera_calibration.json"
+    value = json.loads(path.read_text())
+    change(value["KRT"])
+    path.write_text(json.dumps(value))
+    read.refused(copied, words, path)
 
 
 def test_a_garbled_list_of_frames(copied: Path) -> None:
@@ -174,7 +162,7 @@ def test_a_garbled_list_of_frames(copied: Path) -> None:
     read.refused(copied, "garbled list of frames", "line 3")
 
 
-@pytest.mark.parametrize("member", ["image/camA002.zip", "kinematic_tracking/registration_vertices.zip"])
+@pytest.mark.parametrize("member", ["image/camA002.zip", MESHES])
 def test_an_archive_that_is_cut_off(copied: Path, member: str) -> None:
     path = copied / member
     path.write_bytes(path.read_bytes()[:-40])
@@ -192,7 +180,7 @@ def test_a_picture_that_is_cut_off(copied: Path, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("content", [b"", b"no mesh", ply(np.zeros((9, 3)))])
 def test_a_damaged_mesh(copied: Path, content: bytes) -> None:
-    pack(copied / "kinematic_tracking" / "registration_vertices.zip", {f"{frame}.ply": content for frame in FRAMES})
+    pack(copied / MESHES, {f"{frame}.ply": content for frame in FRAMES})
     read.refused(copied, "tracked mesh")
 
 

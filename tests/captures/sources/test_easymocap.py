@@ -56,53 +56,25 @@ def test_so_it_does_from_videos(tmp_path: Path) -> None:
     check_same(scene_of(tmp_path, "easymocap", tmp_path / "scene", truth.names), truth, lossless=False)
 
 
-INTRI = """%YAML:1.0
----
-names:
-  - "1"
-  - "Camera_B2"
-K_1: !!opencv-matrix
-  rows: 3
-  cols: 3
-  dt: d
-  data: [50., 0., 19.5, 0., 5.1e+01, 9.5, 0., 0., 1.]
-D_1: !!opencv-matrix
-  rows: 5
-  cols: 1
-  dt: d
-  data: [-0.100000, 0.020000,
-         0.001000, -0.002000, 0.000000]
-H_1: 20
-W_1: 40.0000000000
-K_Camera_B2: !!opencv-matrix
-  rows: 3
-  cols: 3
-  dt: d
-  data: [50., 0., 19.5, 0., 51., 9.5, 0., 0., 1.]
-"""
-EXTRI = """%YAML:1.0
----
-R_1: !!opencv-matrix
-  rows: 3
-  cols: 1
-  dt: d
-  data: [0., -1.5707963267948966, 0.]
-T_1: !!opencv-matrix
-  rows: 3
-  cols: 1
-  dt: d
-  data: [0., 0., 2.]
-Rot_Camera_B2: !!opencv-matrix
-  rows: 3
-  cols: 3
-  dt: d
-  data: [1., 0., 0., 0., 1., 0., 0., 0., 1.]
-T_Camera_B2: !!opencv-matrix
-  rows: 3
-  cols: 1
-  dt: d
-  data: [0., 0., 2.]
-"""
+def matrix(name: str, rows: int, columns: int, data: str) -> str:
+    """As OpenCV writes it."""
+    return f"{name}: !!opencv-matrix\n  rows: {rows}\n  cols: {columns}\n  dt: d\n  data: [{data}]\n"
+
+
+INTRI = (
+    '%YAML:1.0\n---\nnames:\n  - "1"\n  - "Camera_B2"\n'
+    + matrix("K_1", 3, 3, "50., 0., 19.5, 0., 5.1e+01, 9.5, 0., 0., 1.")
+    + matrix("D_1", 5, 1, "-0.100000, 0.020000,\n         0.001000, -0.002000, 0.000000")
+    + "H_1: 20\nW_1: 40.0000000000\n"
+    + matrix("K_Camera_B2", 3, 3, "50., 0., 19.5, 0., 51., 9.5, 0., 0., 1.")
+)
+EXTRI = (
+    "%YAML:1.0\n---\n"
+    + matrix("R_1", 3, 1, "0., -1.5707963267948966, 0.")
+    + matrix("T_1", 3, 1, "0., 0., 2.")
+    + matrix("Rot_Camera_B2", 3, 3, "1., 0., 0., 0., 1., 0., 0., 0., 1.")
+    + matrix("T_Camera_B2", 3, 1, "0., 0., 2.")
+)
 
 
 def write_example(root: Path, intri: str = INTRI, extri: str = EXTRI) -> Path:
@@ -121,7 +93,6 @@ def test_an_example_by_hand(tmp_path: Path) -> None:
     first, second = read(tmp_path).views
     np.testing.assert_allclose(first.camera.centre, [-2, 0, 0], atol=1e-12)
     np.testing.assert_allclose(first.camera.forward, [1, 0, 0], atol=1e-12)
-    assert first.lens is not None
     assert first.lens.K.tolist() == [[50, 0, 20], [0, 51, 10], [0, 0, 1]]
     assert first.lens.coefficients.tolist() == [-0.1, 0.02, 0.001, -0.002, 0]
     assert second.camera.centre.tolist() == [0, 0, -2]
@@ -141,9 +112,8 @@ def test_labels_of_parts_are_opaque_and_opacity_stays(tmp_path: Path) -> None:
 
 def test_of_several_folders_of_masks_one_is_read_and_named(copied: Path) -> None:
     shutil.copytree(copied / "mask", copied / "mask_cihp")
-    assert [str(one) for one in read(copied).left_out] == [
-        "note: masks are those of the folder mask; mask_cihp are not read"
-    ]
+    (said,) = map(str, read(copied).left_out)
+    assert said == "note: masks are those of the folder mask; mask_cihp are not read"
 
 
 def test_a_camera_without_pictures_and_one_without_calibration_are_left_out(copied: Path) -> None:
@@ -167,9 +137,7 @@ BAD = [
 ]
 
 
-@pytest.mark.parametrize(
-    ("intri", "extri", "message", "word"), [case[1:] for case in BAD], ids=[case[0] for case in BAD]
-)
+@pytest.mark.parametrize(("intri", "extri", "message", "word"), [row[1:] for row in BAD], ids=[row[0] for row in BAD])
 def test_what_is_wrong_with_the_calibration_is_said(
     tmp_path: Path, intri: str, extri: str, message: str, word: str
 ) -> None:

@@ -24,9 +24,7 @@ def truth() -> Film:
 
 def shared_k(actor: Film) -> list[list[float]]:
     """K of all cameras, for the rig's size."""
-    K = np.diag([2200 / WIDTH, 3208 / HEIGHT, 1.0]) @ actor.cameras[0].K
-    rows: list[list[float]] = K.tolist()
-    return rows
+    return (np.diag([2200 / WIDTH, 3208 / HEIGHT, 1.0]) @ actor.cameras[0].K).tolist()
 
 
 def poses(actor: Film) -> dict[str, Any]:
@@ -63,7 +61,6 @@ def test_the_filmed_actor_comes_back(filmed: Path, tmp_path: Path) -> None:
     scene = scene_of(filmed, "nersemble", tmp_path / "scene", truth().names)
     check_same(scene, truth())
     plates = scene.open_plates()
-    assert plates is not None
     for c in range(len(truth().names)):
         error = float(np.mean((plates.image(c, 0).astype(float) - truth().plates[c]) ** 2))
         assert 10 * np.log10(255**2 / error) > 45
