@@ -40,18 +40,14 @@ def test_damage_of_any_file_is_named(rich: Path, tmp_path: Path) -> None:
         folder = Path(shutil.copytree(rich, tmp_path / path.name))
         data = path.read_bytes()
         flipped = flip_bits(data, np.random.default_rng(len(path.name)))
-        for what, damaged in {
-            "truncated": data[: len(data) // 2],
-            "a byte short": data[:-1],
-            "flipped": flipped,
-        }.items():
-            (folder / path.name).write_bytes(damaged)
+        for what, damaged in enumerate((data[: len(data) // 2], data[:-1], flipped, None)):  # None: missing
+            (folder / path.name).unlink()
+            if damaged is not None:
+                (folder / path.name).write_bytes(damaged)
             assert any(problem.startswith(f"{path.name}:") for problem in validate_asset(folder)), (path.name, what)
             if path.name in READ:
                 with pytest.raises(UserError):
                     read_asset(folder)
-        (folder / path.name).unlink()
-        assert any(problem.startswith(f"{path.name}:") for problem in validate_asset(folder)), path.name
 
 
 def textures(**values: object) -> Callable[[Any], object]:
@@ -89,11 +85,18 @@ def test_wrong_values(rich_copy: Path, change: Callable[[Any], object], file: st
     assert_found(rich_copy, file, word)
 
 
+def swap_halves(manifest: dict[str, Any]) -> None:
+    texture = manifest["levels"][1]["texture"]
+    texture["colour_rect"], texture["alpha_rect"] = texture["alpha_rect"], texture["colour_rect"]
+
+
 @pytest.mark.parametrize(
     ("change", "word"),
     [
         (textures(frame_rate=[25, 1]), "frames a second"),
         (put(*TEXTURE, "videos", 0, "mime", to='video/mp4; codecs="avc1.42001e"'), "MIME type"),
+        (lambda manifest: manifest["levels"][1]["layers"].reverse(), "outermost in"),
+        (swap_halves, "alpha_rect"),
     ],
 )
 def test_what_is_wrong_but_can_be_read(rich_copy: Path, change: Callable[[Any], object], word: str) -> None:
