@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import wave
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -26,6 +25,7 @@ from facefolds_core.packaging.settings import LEAST_QUALITY
 from facefolds_core.params import CompressParams, merged
 from facefolds_core.pipeline.compress import compress
 from tests.assets import CENTRE, PLAIN, WINDOW, cap_crops, cap_mesh, cap_textures, radius_of, write_store
+from tests.captures.fixtures import save_wav
 from tests.scenes import look_at_origin
 
 FROM_CAPTURE = Similarity(0.5, np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]]), np.array([0.1, -0.2, 0.3]))
@@ -81,7 +81,6 @@ def test_quality_by_target(folders: SubjectFolders) -> None:
         compress(folders)
         assert validate_asset(folders.asset) == []
         level = read_asset(folders.asset).manifest.full
-        assert level.quality is not None
         qualities.append(level.quality.psnr_to_model - target)
         sizes.append([video.bytes for video in level.texture.videos])
     assert all(0 <= over < 1.5 for over in qualities), qualities
@@ -127,7 +126,7 @@ def test_levels_of_detail(folders: SubjectFolders) -> None:
     entries = asset.manifest.levels
     assert [entry.name for entry in entries] == ["small", "medium", "full"]
     assert all(a.bytes < b.bytes for a, b in pairwise(entries))
-    qualities = [entry.quality.psnr_to_model for entry in entries if entry.quality]
+    qualities = [entry.quality.psnr_to_model for entry in entries]
     assert 15 < qualities[0] < qualities[1] < qualities[2]
     for entry, level, side in zip(entries, asset.levels, (5, 8, 12), strict=True):
         assert max(layer.vertices for layer in entry.layers) <= side**2
@@ -136,26 +135,20 @@ def test_levels_of_detail(folders: SubjectFolders) -> None:
 
 def test_poster_photos_and_sound(folders: SubjectFolders) -> None:
     rig(folders, photos=3)
-    with wave.open(str(folders.scene / "audio.wav"), "wb") as file:
-        file.setparams((1, 2, 16_000, 0, "NONE", ""))
-        file.writeframes(bytes(2000))
+    save_wav(folders.scene / "audio.wav", np.zeros(1000), 16_000)
     compress(folders)
     assert validate_asset(folders.asset) == []
-    manifest = read_asset(folders.asset).manifest
-    assert manifest.audio is not None and manifest.audio.file == "audio.m4a"
-    assert manifest.poster is not None and max(manifest.poster.width, manifest.poster.height) == 48
-    assert [(photo.camera, photo.frame) for photo in manifest.photos] == [("cam1", 0), ("cam1", 1)]
-    scene = read_scene(folders.scene)
-    train, unseen = ([scene.cameras[i] for i in scene.indices(split)] for split in ("train", "holdout"))
-    assert manifest.view is not None and manifest.view.measured is not None
-    assert manifest.view.model_copy(update={"good": None}) == filmed_view(train, unseen)
-    good = manifest.view.good
-    assert good is not None and good.azimuth[0] < 0 < good.azimuth[1]
-    assert manifest.audio.mime == 'audio/mp4; codecs="mp4a.40.2"'
+    manifest, scene = read_asset(folders.asset).manifest, read_scene(folders.scene)
+    assert (manifest.audio.file, manifest.audio.mime) == ("audio.m4a", 'audio/mp4; codecs="mp4a.40.2"')
+    assert max(manifest.poster.width, manifest.poster.height) == 48
     assert manifest.poster.K is not None and manifest.poster.background == BACKGROUND
-    camera = read_scene(folders.scene).cameras[1]
-    np.testing.assert_array_equal(manifest.photos[0].w2c, camera.w2c)
-    np.testing.assert_array_equal(manifest.photos[0].K, camera.K)
+    assert [(photo.camera, photo.frame) for photo in manifest.photos] == [("cam1", 0), ("cam1", 1)]
+    np.testing.assert_array_equal(manifest.photos[0].w2c, scene.cameras[1].w2c)
+    np.testing.assert_array_equal(manifest.photos[0].K, scene.cameras[1].K)
+    train, unseen = ([scene.cameras[i] for i in scene.indices(split)] for split in ("train", "holdout"))
+    assert manifest.view.measured is not None
+    assert manifest.view.model_copy(update={"good": None}) == filmed_view(train, unseen)
+    assert manifest.view.good.azimuth[0] < 0 < manifest.view.good.azimuth[1]
 
 
 @pytest.mark.parametrize(

@@ -23,21 +23,15 @@ from tests.viewer.fixtures import add_reflection, change_manifest, random_reflec
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def asset(tmp_path_factory: pytest.TempPathFactory) -> Asset:
     folder = tmp_path_factory.mktemp("glossy") / "asset"
     make_asset(folder, layers=2, frames=1, resolution=48)
     add_reflection(folder)
-    return folder
-
-
-@pytest.fixture
-def asset(made: Path) -> Asset:
-    return read_asset(made)
+    return read_asset(folder)
 
 
 def test_the_file_holds_the_maps_to_half_a_code(asset: Asset) -> None:
     maps, found = random_reflection(), asset.full.reflection()
-    assert found is not None
     for name, largest in (("gloss", 1.0), ("offset", 0.6), ("environment", 1.0), ("normals", 2.0)):
         np.testing.assert_allclose(getattr(found, name), getattr(maps, name), atol=0.51 * largest / 255, err_msg=name)
     assert found.window == maps.window
@@ -46,7 +40,6 @@ def test_the_file_holds_the_maps_to_half_a_code(asset: Asset) -> None:
 def test_what_a_player_adds_is_what_the_model_adds(asset: Asset) -> None:
     """The layers' windows are not the maps'."""
     maps = asset.full.reflection()
-    assert maps is not None
     model = Reflection(ReflectionShape((6, 5), 9))
     with torch.no_grad():
         for name in ("gloss", "offset", "normals", "environment"):
@@ -74,9 +67,8 @@ def test_a_rotation_to_the_room_turns_the_light(asset: Asset) -> None:
         np.testing.assert_allclose(one, other, atol=1e-5)
 
 
-def test_a_rectangle_beside_the_picture_is_refused(made: Path, tmp_path: Path) -> None:
-    folder = tmp_path / "asset"
-    shutil.copytree(made, folder)
+def test_a_rectangle_beside_the_picture_is_refused(asset: Asset, tmp_path: Path) -> None:
+    folder = Path(shutil.copytree(asset.folder, tmp_path / "asset"))
     change_manifest(folder, lambda value: value["levels"][-1]["reflection"].update(gloss_rect=[0, 1000, 5, 6]))
     assert any("not inside the reflection's picture" in problem for problem in validate_asset(folder))
 
@@ -94,5 +86,5 @@ def test_grids_keep_the_reflection_where_there_is_one(tmp_path: Path) -> None:
     assert read_places(path)[2] is None
     np.savez(path, **places, **{f"reflection_{name}": np.asarray(value) for name, value in vars(maps).items()})
     found = read_places(path)[2]
-    assert found is not None and found.window == maps.window
+    assert found.window == maps.window
     np.testing.assert_array_equal(found.environment, maps.environment)

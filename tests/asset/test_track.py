@@ -38,7 +38,6 @@ def asset(tmp_path_factory: pytest.TempPathFactory) -> Asset:
 
 
 def test_the_track_comes_back_from_its_file(asset: Asset) -> None:
-    assert asset.track is not None
     assert np.array_equal(asset.track.quaternions, TRACK.quaternions.astype(np.float32))
     assert np.array_equal(asset.track.translations, TRACK.translations.astype(np.float32))
     assert (asset.folder / "track.bin").stat().st_size == 28 * 3
@@ -57,8 +56,6 @@ def test_a_still_head_has_no_such_key(tmp_path: Path) -> None:
     make_asset(tmp_path / "asset", layers=1, frames=1, resolution=32)
     assert "track_file" not in json.loads((tmp_path / "asset" / "manifest.json").read_text())
 
-
-Change = Callable[[Any], object]
 
 POSES = np.array([[1, 0, 0, 0, 0, 0, 0]] * 3, "<f4")
 
@@ -96,7 +93,6 @@ def test_a_picture_shows_the_head_where_it_stood(asset: Asset) -> None:
     """As the camera that moved against it would see a head that stands still."""
     camera = look_at_origin("side", 25, 10, 24)
     still = replace(asset, track=None)
-    assert asset.track is not None
     moved, _ = render_asset(asset, camera, 2)
     expected, _ = render_asset(still, camera.transformed(asset.track.at(2).inverse()), 2)
     unmoved, _ = render_asset(still, camera, 2)
@@ -129,7 +125,6 @@ def test_a_torso_comes_back(over_torso: Asset) -> None:
 def test_a_torso_stays_in_the_room(asset: Asset) -> None:
     """As the whole does beneath the plane if it is not turned, and above it if it is."""
     turning, camera = with_track(asset.full, 20), look_at_origin("side", 25, 10, 60)
-    assert turning.track is not None
     track = replace(turning.track, torso=Torso.at([0.0, 0.0, -1.0], 0.0, 0.05, turning.track.at(0)))
 
     def opacity(level: AssetLevel, pose: int) -> NDArray[np.float32]:
@@ -150,16 +145,13 @@ def test_a_glb_shows_the_torso_where_it_is_in_its_frame(over_torso: Asset, tmp_p
     assert np.abs(low - opened(tmp_path / "b.glb")[0]["accessors"][position]["min"]).max() > 0.005
 
 
+NO_TORSO = [("normal", [1, 1, 0]), ("quaternion", [2, 0, 0, 0])]
+
+
 @pytest.mark.parametrize(
-    "change",
-    [
-        put("torso", "normal", to=[1, 1, 0]),
-        put("torso", "quaternion", to=[2, 0, 0, 0]),
-        lambda manifest: manifest.pop("track_file"),
-    ],
-    ids=["normal", "quaternion", "no track"],
+    "change", [*(put("torso", key, to=value) for key, value in NO_TORSO), lambda manifest: manifest.pop("track_file")]
 )
-def test_a_torso_that_is_none_is_a_problem(over_torso: Asset, change: Change, tmp_path: Path) -> None:
+def test_a_torso_that_is_none_is_a_problem(over_torso: Asset, change: Callable[[Any], object], tmp_path: Path) -> None:
     folder = Path(shutil.copytree(over_torso.folder, tmp_path / "asset"))
     edit(folder, change)
     assert any("a torso needs" in problem for problem in validate_asset(folder))
