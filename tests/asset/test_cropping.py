@@ -26,18 +26,24 @@ def patches(boxes: list[tuple[int, int, int, int]], alpha: int = 200) -> np.ndar
     return frames
 
 
+def check_same(meshes: list[TexturedMesh], frames: np.ndarray, *azimuths: float) -> None:
+    """AssertionError unless pictures of the crops are those of the whole."""
+    crops = crop_layers(meshes, [WINDOW] * len(meshes), Store(frames), 1)
+    textures = [crop.cut(frames[0, crop.source]) for crop in crops]
+    for camera in (look_at_origin("c", azimuth, 5, 64) for azimuth in azimuths):
+        before = composite(cast_layers(camera, meshes), list(frames[0]))
+        after = composite(cast_layers(camera, [crop.mesh for crop in crops]), textures)
+        assert before[1].max() > 0.5
+        for a, b in zip(before, after, strict=True):
+            np.testing.assert_allclose(a, b, atol=1e-5)
+
+
 def test_rendering_is_unchanged() -> None:
     frames = patches([(10, 30, 5, 12), (0, 7, 40, 48), (20, 21, 20, 21)])
     meshes = [cap_mesh(0.4 - 0.03 * i, vertices_a_side=17) for i in range(3)]
     crops = crop_layers(meshes, [WINDOW] * 3, Store(frames), 1)
     assert all(len(crop.mesh.faces) < len(meshes[0].faces) for crop in crops)
-    camera = look_at_origin("front", 5, 5, 64)
-    before = composite(cast_layers(camera, meshes), list(frames[0]))
-    textures = [crop.cut(frames[0, crop.source]) for crop in crops]
-    after = composite(cast_layers(camera, [crop.mesh for crop in crops]), textures)
-    assert before[1].max() > 0.5
-    for a, b in zip(before, after, strict=True):
-        np.testing.assert_allclose(a, b, atol=1e-5)
+    check_same(meshes, frames, 5)
 
 
 def test_no_hole_in_a_clear_front_lets_the_back_of_its_layer_through() -> None:
@@ -51,15 +57,7 @@ def test_no_hole_in_a_clear_front_lets_the_back_of_its_layer_through() -> None:
         faces = np.concatenate([corner[:, None] + [0, 1, 34], corner[:, None] + [0, 34, 33]]).astype(np.int32)
         return TexturedMesh(points, faces, st)
 
-    frames = patches([(0, 6, 0, SIZE), (0, SIZE, 0, SIZE)])
-    meshes = [tube(0.3), tube(0.2)]
-    crops = crop_layers(meshes, [WINDOW] * 2, Store(frames), 1)
-    cameras = [look_at_origin("c", azimuth, 5, 48) for azimuth in (-60, -20, 0, 35, 80)]
-    for camera in cameras:
-        before = composite(cast_layers(camera, meshes), list(frames[0]))
-        textures = [crop.cut(frames[0, crop.source]) for crop in crops]
-        after = composite(cast_layers(camera, [crop.mesh for crop in crops]), textures)
-        np.testing.assert_allclose(before[0], after[0], atol=1e-5)
+    check_same([tube(0.3), tube(0.2)], patches([(0, 6, 0, SIZE), (0, SIZE, 0, SIZE)]), -60, -20, 0, 35, 80)
 
 
 def test_window_belongs_to_the_crop() -> None:

@@ -15,8 +15,7 @@ def shuffled_mesh() -> TexturedMesh:
     """A cap with vertices and faces in random order, one vertex doubled and one unused."""
     rng = np.random.default_rng(0)
     mesh = cap_mesh(0.4, 15)
-    vertices = np.concatenate([mesh.vertices, mesh.vertices[:2]])
-    st = np.concatenate([mesh.st, mesh.st[:2]])
+    vertices, st = (np.concatenate([values, values[:2]]) for values in (mesh.vertices, mesh.st))
     faces = np.where(mesh.faces == 0, len(mesh.vertices), mesh.faces)
     order = rng.permutation(len(vertices))
     faces = rng.permutation(np.argsort(order)[faces])

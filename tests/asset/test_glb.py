@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 from PIL import Image
+from scipy.spatial.transform import Rotation
 
-from facefolds_core.asset import Asset, read_asset
+from facefolds_core.asset import Asset
 from facefolds_core.asset.glb import write_glb
 from facefolds_core.asset.opaque import opaque_where_covered
 from facefolds_core.errors import UserError
@@ -25,10 +26,8 @@ Opened = tuple[dict[str, Any], bytes]
 
 @pytest.fixture(scope="module")
 def asset(tmp_path_factory: pytest.TempPathFactory) -> Asset:
-    folder = tmp_path_factory.mktemp("glb") / "asset"
-    mesh = MeshCodec(quantization_bits=14, compression_level=7)
-    make_asset(folder, layers=3, frames=3, params=CompressParams(mesh=mesh))
-    return read_asset(folder)
+    params = CompressParams(mesh=MeshCodec(quantization_bits=14, compression_level=7))
+    return make_asset(tmp_path_factory.mktemp("glb") / "asset", layers=3, frames=3, params=params)
 
 
 @pytest.fixture(scope="module")
@@ -50,8 +49,7 @@ def test_each_layer_shows_its_texture(asset: Asset, tmp_path: Path) -> None:
     for layer, texture in zip(asset.layers, asset.frame(2), strict=True):
         st = places[start : start + len(layer.vertices)] * (width, height)
         start += len(layer.vertices)
-        origin = np.rint((st - layer.st * texture.shape[1::-1])[0]).astype(int)
-        x, y = origin
+        x, y = np.rint((st - layer.st * texture.shape[1::-1])[0]).astype(int)
         found = pixels[y : y + texture.shape[0], x : x + texture.shape[1]]
         np.testing.assert_array_equal(found[..., :3], texture[..., :3])
         assert ((found[..., 3] == texture[..., 3]) | (found[..., 3] == 255)).all()
@@ -69,21 +67,22 @@ def test_places_on_the_chart_are_those_of_the_directions(written: Opened) -> Non
 
 def values(document: dict[str, Any], binary: bytes, name: str, width: int) -> np.ndarray[Any, Any]:
     """An attribute of all vertices (V, width)."""
-    accessor = document["accessors"][document["meshes"][0]["primitives"][0]["attributes"][name]]
-    return np.frombuffer(part(document, binary, accessor["bufferView"]), "<f4").reshape(-1, width)
+    return numbers(document, binary, document["meshes"][0]["primitives"][0]["attributes"][name], "<f4", width)
 
 
 def faces_of(document: dict[str, Any], binary: bytes, primitive: int) -> np.ndarray[Any, Any]:
-    accessor = document["accessors"][document["meshes"][0]["primitives"][primitive]["indices"]]
-    return np.frombuffer(part(document, binary, accessor["bufferView"]), "<u4").reshape(-1, 3)
+    return numbers(document, binary, document["meshes"][0]["primitives"][primitive]["indices"], "<u4", 3)
+
+
+def numbers(document: dict[str, Any], binary: bytes, accessor: int, kind: str, width: int) -> np.ndarray[Any, Any]:
+    view = document["accessors"][accessor]["bufferView"]
+    return np.frombuffer(part(document, binary, view), kind).reshape(-1, width)
 
 
 def test_the_subject_looks_to_z_with_y_up(written: Opened) -> None:
     document, _ = written
-    x, y, z, w = document["nodes"][document["scenes"][0]["nodes"][0]]["rotation"]
-    axis = np.array([x, y, z])
-    turned = [v + 2 * w * np.cross(axis, v) + 2 * np.cross(axis, np.cross(axis, v)) for v in np.eye(3)]
-    np.testing.assert_allclose(turned, [[0, 0, 1], [1, 0, 0], [0, 1, 0]], atol=1e-12)  # +x -> +z, +y -> +x, +z -> +y
+    turn = Rotation.from_quat(document["nodes"][document["scenes"][0]["nodes"][0]]["rotation"])
+    np.testing.assert_allclose(turn.apply(np.eye(3)), [[0, 0, 1], [1, 0, 0], [0, 1, 0]], atol=1e-12)  # +x -> +z, ...
 
 
 def test_a_frame_that_is_not_there(asset: Asset, tmp_path: Path) -> None:

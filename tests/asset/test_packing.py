@@ -70,22 +70,21 @@ def test_mip_maps_do_not_mix_layers(sizes: list[tuple[int, int]]) -> None:
                     assert (small[k : k + 2, j : j + 2] == 3 * i + 1).all(), (level, i)
 
 
-@pytest.mark.parametrize("resolution", [37, 60, 64])
-def test_round_trip_of_grey_is_within_rounding(resolution: int) -> None:
-    rng = np.random.default_rng(0)
-    grey = rng.integers(0, 256, (3, resolution, resolution, 1), dtype=np.uint8)
-    alpha = rng.integers(0, 256, grey.shape, dtype=np.uint8)
-    textures = np.concatenate([grey, grey, grey, alpha], -1)
-    layout = AtlasLayout.pack([(resolution, resolution)] * 3)
-    back = np.stack(unpack_picture(pack_frame(list(textures), layout), layout))
-    assert np.abs(back.astype(int) - textures).max() <= 2
+def grey(side: int) -> np.ndarray:
+    """(3, side, side, 4) noise."""
+    luma, alpha = np.random.default_rng(0).integers(0, 256, (2, 3, side, side, 1), dtype=np.uint8)
+    return np.concatenate([luma, luma, luma, alpha], -1)
 
 
-@pytest.mark.parametrize("resolution", [37, 64])
-def test_neighbours_do_not_leak(resolution: int) -> None:
+def plain(side: int) -> np.ndarray:
+    """(4, side, side, 4), each of one colour that is far from its neighbours'."""
     colours = np.array([[255, 0, 0, 255], [0, 255, 0, 0], [0, 0, 255, 255], [255, 255, 0, 0]], np.uint8)
-    textures = np.broadcast_to(colours[:, None, None], (4, resolution, resolution, 4))
-    layout = AtlasLayout.pack([(resolution, resolution)] * 4)
+    return np.broadcast_to(colours[:, None, None], (4, side, side, 4))
+
+
+@pytest.mark.parametrize("textures", [grey(37), grey(60), grey(64), plain(37), plain(64)], ids=lambda x: str(x.shape))
+def test_round_trip_is_within_rounding_and_neighbours_do_not_leak(textures: np.ndarray) -> None:
+    layout = AtlasLayout.pack([textures.shape[1:3]] * len(textures))
     back = np.stack(unpack_picture(pack_frame(list(textures), layout), layout))
     assert np.abs(back.astype(int) - textures).max() <= 2
 

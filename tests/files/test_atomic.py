@@ -7,6 +7,7 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
+from unittest.mock import Mock
 
 import av
 import pytest
@@ -27,10 +28,10 @@ def test_what_lies_beside_the_target_is_left_alone(tmp_path: Path) -> None:
         (tmp_path / name / "precious").write_text("1")
     with atomic_folder(tmp_path / "mygame") as temporary:
         (temporary / "x").write_text("1")
-    assert names(tmp_path) == sorted([*kept, "mygame"])
-    assert names(tmp_path / "mygame") == ["x"]
-    for name in kept:
-        assert names(tmp_path / name) == ["precious"]
+    assert {name: names(tmp_path / name) for name in names(tmp_path)} == {
+        **{name: ["precious"] for name in kept},
+        "mygame": ["x"],
+    }
 
 
 def test_what_another_process_writes_is_left_alone(tmp_path: Path) -> None:
@@ -132,8 +133,7 @@ def test_a_failure_to_move_in_puts_the_old_folder_back(tmp_path: Path, monkeypat
     monkeypatch.setattr(Path, "replace", failing)
     with pytest.raises(OSError), atomic_folder(target) as temporary:
         (temporary / "new").write_text("2")
-    assert names(tmp_path) == ["out"]
-    assert names(target) == ["old"]
+    assert (names(tmp_path), names(target)) == (["out"], ["old"])
 
 
 def test_what_cannot_be_put_back_is_not_deleted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -142,16 +142,12 @@ def test_what_cannot_be_put_back_is_not_deleted(tmp_path: Path, monkeypatch: pyt
     (left / "old" / "out" / "x").write_text("1")
     (left / MARK).touch()
 
-    def failing(self: Path, to: Path) -> Path:
-        raise OSError(errno.EACCES, "Permission denied")
-
     with monkeypatch.context() as patched:
-        patched.setattr(Path, "replace", failing)
+        patched.setattr(Path, "replace", Mock(side_effect=OSError(errno.EACCES, "Permission denied")))
         clear_temporaries(tmp_path)
     assert (left / "old" / "out" / "x").exists() and (left / MARK).exists()
     clear_temporaries(tmp_path)
-    assert names(tmp_path) == ["out"]
-    assert names(tmp_path / "out") == ["x"]
+    assert (names(tmp_path), names(tmp_path / "out")) == (["out"], ["x"])
 
 
 def test_folders_that_must_not_be_replaced_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -205,20 +201,17 @@ def test_the_umask_decides_on_modes(tmp_path: Path) -> None:
 
 
 def test_errors_name_the_file_that_was_to_be(tmp_path: Path) -> None:
-    with pytest.raises(OSError) as unnamed, atomic_folder(tmp_path / "asset"):
+    asset = tmp_path / "asset"
+    with pytest.raises(OSError) as unnamed, atomic_folder(asset):
         raise OSError(errno.ENOSPC, "No space left on device")
-    assert unnamed.value.filename == str(tmp_path / "asset")
-    with (
-        pytest.raises(OSError) as inside,
-        atomic_folder(tmp_path / "asset") as temporary,
-        atomic_file(temporary / "sub" / "poster.jpg") as file,
-    ):
+    assert unnamed.value.filename == str(asset)
+    with pytest.raises(OSError) as inside, atomic_folder(asset) as made, atomic_file(made / "sub" / "a.jpg") as file:
         raise OSError(errno.ENOSPC, "No space left on device", str(file))
-    assert inside.value.filename == str(tmp_path / "asset" / "sub" / "poster.jpg")
-    with pytest.raises(OSError) as pyav, atomic_folder(tmp_path / "asset") as temporary:
-        raise av.error.OSError(errno.EFBIG, "File too large", str(temporary / "films" / "000.mp4"))
-    assert (pyav.value.errno, pyav.value.filename) == (errno.EFBIG, str(tmp_path / "asset" / "films" / "000.mp4"))
-    with pytest.raises(UserError) as users, atomic_folder(tmp_path / "asset") as temporary:
-        raise UserError("bad", file=temporary / "full.mp4")
-    assert users.value.file == tmp_path / "asset" / "full.mp4"
+    assert inside.value.filename == str(asset / "sub" / "a.jpg")
+    with pytest.raises(OSError) as pyav, atomic_folder(asset) as made:
+        raise av.error.OSError(errno.EFBIG, "File too large", str(made / "films" / "000.mp4"))
+    assert (pyav.value.errno, pyav.value.filename) == (errno.EFBIG, str(asset / "films" / "000.mp4"))
+    with pytest.raises(UserError) as users, atomic_folder(asset) as made:
+        raise UserError("bad", file=made / "full.mp4")
+    assert users.value.file == asset / "full.mp4"
     assert names(tmp_path) == []

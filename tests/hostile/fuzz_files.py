@@ -81,11 +81,6 @@ def _scene(folder: Path) -> None:
         camera.transformed(scene.from_capture.inverse())
 
 
-def _surface(folder: Path) -> Any:
-    made = scene_of_two_frames(folder / "scene")
-    return made.load_surface()
-
-
 def _gaussians(folder: Path) -> Any:
     found = read_found(folder / "subject" / "gaussians.npz", 1)
     return [found.splats.values, np.array(found.psnr), found.cameras.measured, found.cameras.errors]
@@ -100,26 +95,21 @@ def _grids(folder: Path) -> Any:
     return [*_parts(read_grids(path)), *map(repr, read_places(path)[:2])]
 
 
-def _sheets(folder: Path) -> Any:
-    path = folder / "surfaces" / "sheets.npz"
-    return _parts(read_surfaces(path))
-
-
 def _surfaces(folder: Path) -> Any:
     return [part for s in read_surfaces(folder / "surfaces" / "surfaces.npz") for part in (s.vertices, s.faces)]
 
 
 def _meshes(folder: Path) -> Any:
-    return [part for m in read_meshes(folder / "meshes" / "meshes.npz") for part in (m.vertices, m.faces, m.st)]
+    return [part for m in read_meshes(folder / "meshes" / "meshes.npz") for part in vars(m).values()]
 
 
 KINDS = (
     Kind(("scene/frames.arrow",), _store, False),
     Kind(("scene/scene.json",), _scene, False),
-    Kind(("scene/surface.npz",), _surface),
+    Kind(("scene/surface.npz",), lambda folder: scene_of_two_frames(folder / "scene").load_surface()),
     Kind(("subject/gaussians.npz",), _gaussians),
     Kind(("samples/grids.npz",), _grids),
-    Kind(("surfaces/sheets.npz",), _sheets),
+    Kind(("surfaces/sheets.npz",), lambda folder: _parts(read_surfaces(folder / "surfaces" / "sheets.npz"))),
     Kind(("surfaces/surfaces.npz",), _surfaces),
     Kind(("meshes/meshes.npz",), _meshes),
     Kind(("model/model.safetensors", "model/model.json"), lambda folder: load_model(folder / "model"), False),
