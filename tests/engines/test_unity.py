@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import re
+import runpy
 import shutil
 import subprocess
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -24,6 +25,7 @@ from facefolds_core.rendering.reference import AssetCaster
 from tests.assets import SOURCE, make_asset
 from tests.engines import unity_shaders
 from tests.engines.unity_checks import PACKAGE, ROOT, SHADERS, STUBS, compiled, core, missing, run, spirv
+from tests.hostile.fuzz_assets import put
 from tests.pictures import GREY_VALUE, five_cameras, lit_picture, psnr
 from tests.viewer.fixtures import add_reflection
 
@@ -78,11 +80,8 @@ def test_every_name_that_the_player_sets_is_one_of_the_shader() -> None:
 
 
 def test_every_file_has_its_meta() -> None:
-    spec = importlib.util.spec_from_file_location("metas", ROOT / "engines" / "unity" / "metas.py")
-    assert spec is not None and spec.loader is not None
-    metas: Any = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(metas)
-    expected = {path.with_name(f"{path.name}.meta"): metas.meta(path) for path in metas.imported()}
+    metas = runpy.run_path(str(ROOT / "engines" / "unity" / "metas.py"))
+    expected = {path.with_name(f"{path.name}.meta"): metas["meta"](path) for path in metas["imported"]()}
     assert expected == {path: path.read_text() for path in PACKAGE.rglob("*.meta")}
     assert len(set(re.findall(r"guid: (\w+)", "".join(expected.values())))) == len(expected)
 
@@ -103,10 +102,36 @@ def test_the_manifest_is_read_as_python_reads_it(check: Path, glossy: Asset) -> 
         np.testing.assert_allclose(place, [texture.alpha_rect[0] + x + 0.25 * w, texture.alpha_rect[1] + y + 0.75 * h])
 
 
-def _changed(asset: Asset, tmp_path: Path, **changes: Any) -> Path:
-    manifest = json.loads((asset.folder / "manifest.json").read_text())
-    (tmp_path / "manifest.json").write_text(json.dumps(manifest | changes))
-    return tmp_path / "manifest.json"
+def renamed(manifest: dict[str, Any]) -> None:
+    layer = manifest["levels"][-1]["layers"][1]
+    manifest["levels"] = json.loads(json.dumps(manifest["levels"]).replace(layer["mesh"], f"../{layer['mesh']}"))
+
+
+@pytest.mark.parametrize(
+    ("change", "status", "said"),
+    [
+        (put("later", to={"a": [1, None, "ä\n"]}), 0, "caps"),  # of a later writer: passed over
+        (lambda manifest: manifest.update(version=99, minVersion=99), 1, "format 99 cannot be read"),
+        (lambda manifest: manifest.update(version=3, minVersion=3), 1, "format 3 cannot be read"),
+        (put("extensionsRequired", to=["SOMETHING_new"]), 1, "extensions that this player does not know"),
+        (put("format", to="gltf"), 1, "no manifest of facefolds"),
+        (put("levels", to=[]), 1, "levels is empty"),
+        (put("levels", to=[{"name": "full"}]), 1, "levels[0].texture is missing"),
+        (renamed, 1, "no plain file name"),
+        (None, 1, "not JSON: at character 24"),
+    ],
+    ids=lambda value: value if isinstance(value, str) else "",
+)
+def test_what_is_wrong_is_said(
+    check: Path, glossy: Asset, tmp_path: Path, change: Callable[[Any], Any] | None, status: int, said: str
+) -> None:
+    manifest = json.loads((glossy.folder / "manifest.json").read_text())
+    if change is not None:
+        change(manifest)
+    text = '{"format": "facefolds", }' if change is None else json.dumps(manifest)
+    (tmp_path / "manifest.json").write_text(text)
+    done = run("mono", check, "read", tmp_path / "manifest.json")
+    assert done.returncode == status and said in done.stdout.splitlines()[0]
 
 
 def test_poses_are_read_from_their_file(check: Path, tmp_path: Path) -> None:
@@ -119,42 +144,6 @@ def test_poses_are_read_from_their_file(check: Path, tmp_path: Path) -> None:
     poses.write_bytes(poses.read_bytes()[:-4])
     done = run("mono", check, "poses", manifest, poses)
     assert done.returncode == 1 and "track.bin has 80 bytes for 3 frames" in done.stdout
-
-
-def test_keys_of_a_later_writer_are_passed_over(check: Path, glossy: Asset, tmp_path: Path) -> None:
-    done = run("mono", check, "read", _changed(glossy, tmp_path, later={"a": [1, None, "ä\n"]}))
-    assert (done.returncode, done.stdout.splitlines()[0]) == (0, "caps")
-
-
-@pytest.mark.parametrize(
-    ("changes", "said"),
-    [
-        ({"version": 99, "minVersion": 99}, "format 99 cannot be read"),
-        ({"version": 3, "minVersion": 3}, "format 3 cannot be read"),
-        ({"extensionsRequired": ["SOMETHING_new"]}, "extensions that this player does not know"),
-        ({"format": "gltf"}, "no manifest of facefolds"),
-        ({"levels": []}, "levels is empty"),
-        ({"levels": [{"name": "full"}]}, "levels[0].texture is missing"),
-    ],
-    ids=lambda value: value if isinstance(value, str) else "",
-)
-def test_what_is_wrong_is_said(check: Path, glossy: Asset, tmp_path: Path, changes: dict[str, Any], said: str) -> None:
-    done = run("mono", check, "read", _changed(glossy, tmp_path, **changes))
-    assert done.returncode == 1 and said in done.stdout
-
-
-def test_a_file_elsewhere_is_refused(check: Path, glossy: Asset, tmp_path: Path) -> None:
-    mesh = glossy.full.entry.layers[1].mesh
-    text = (glossy.folder / "manifest.json").read_text().replace(mesh, f"../{mesh}")
-    (tmp_path / "manifest.json").write_text(text)
-    done = run("mono", check, "read", tmp_path / "manifest.json")
-    assert done.returncode == 1 and "no plain file name" in done.stdout
-
-
-def test_a_text_that_is_no_json_is_said(check: Path, tmp_path: Path) -> None:
-    (tmp_path / "manifest.json").write_text('{"format": "facefolds", }')
-    done = run("mono", check, "read", tmp_path / "manifest.json")
-    assert done.returncode == 1 and "not JSON: at character 24" in done.stdout
 
 
 def test_poses_turn_in_unity_as_in_the_asset(check: Path) -> None:
@@ -172,7 +161,6 @@ def drawn(check: Path, asset: Asset, camera: Camera, place: Path, room: bool) ->
     """(H, W, 3) as the package's own C# computes it."""
     level, hits = asset.full, AssetCaster(asset).cast(camera)
     reflection = level.entry.reflection
-    assert reflection is not None
     picture = rgb_picture(list(level.pictures())[FRAME], level.entry.texture)
     st = np.where(hits.hit[..., None], hits.st, np.nan)
     files = {"picture": picture / 255, "st": st, "along": camera.rays()[1]}

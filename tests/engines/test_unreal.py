@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import importlib.util
+import runpy
 import sys
 from pathlib import Path
-from types import ModuleType
+from types import SimpleNamespace
 from unittest.mock import MagicMock
 
 import pytest
@@ -28,14 +28,6 @@ def unreal(monkeypatch: pytest.MonkeyPatch) -> MagicMock:
     return stub
 
 
-def loaded() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("import_face", SCRIPT)
-    assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
 def test_sequence_materials_and_slots(unreal: MagicMock, tmp_path: Path) -> None:
     level = make_asset(tmp_path / "asset", layers=2, frames=2, resolution=32).full
     write_layered(tmp_path / "face.glb", level, "caps")
@@ -52,7 +44,7 @@ def test_sequence_materials_and_slots(unreal: MagicMock, tmp_path: Path) -> None
     create = unreal.AssetToolsHelpers.get_asset_tools.return_value.create_asset
     assets: dict[str, MagicMock] = {}
     create.side_effect = lambda name, *_: assets.setdefault(name, MagicMock())
-    module = loaded()
+    module = SimpleNamespace(**runpy.run_path(str(SCRIPT)))
     module.main(tmp_path / "face.glb", tmp_path / "textures")
     assets["sequence"].set_sequence_path.assert_called_once_with(str(tmp_path / "textures" / "frame_00000.jpg"))
     unreal.FrameRate.assert_called_once_with(30, 1)

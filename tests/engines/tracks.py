@@ -20,6 +20,5 @@ def with_track(level: AssetLevel, degrees: float = 20.0) -> AssetLevel:
 
 def over_torso(level: AssetLevel) -> AssetLevel:
     """The head of a level moves over a torso that stays as it was in the first frame."""
-    assert level.track is not None
     torso = Torso.at([0.0, 0.0, -1.0], -0.05, 0.1, level.track.at(0))
     return replace(level, track=replace(level.track, torso=torso))

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
+from scipy.spatial.transform import Rotation
 
 from facefolds_core.asset import read_asset
 from facefolds_core.asset.gltf.checking import check_glb
@@ -39,12 +40,10 @@ def test_a_player_written_from_the_document_agrees(vectors: Path) -> None:
     for view in (view for view in views if view["asset"] == "short" and view["frame"] in (0, 2)):
         player = Player(vectors / "short", 0 if view["level"] == "small" else -1)
         side = view["width"]
-        pixels = np.stack(np.meshgrid(*[np.arange(side // 4, 3 * side // 4, max(1, side // 42))] * 2), -1).reshape(
-            -1, 2
-        )
-        quarters = [
-            _shown(player, vectors, view, pixels + np.array((dx, dy))) for dx in (0.25, 0.75) for dy in (0.25, 0.75)
-        ]
+        places = np.arange(side // 4, 3 * side // 4, max(1, side // 42))
+        pixels = np.stack(np.meshgrid(places, places), -1).reshape(-1, 2)
+        offsets = np.stack(np.meshgrid((0.25, 0.75), (0.25, 0.75)), -1).reshape(-1, 2)
+        quarters = [_shown(player, vectors, view, pixels + offset) for offset in offsets]
         points = _shown(player, vectors, view, pixels + 0.5)
         for folder, found in (("reference", np.mean(quarters, 0)), ("reference_points", points)):
             truth = np.asarray(Image.open(vectors / folder / view["file"]), float) / 255
@@ -56,13 +55,7 @@ def _shown(player: Player, vectors: Path, view: dict, pixels: np.ndarray) -> np.
     """What the rays through these places of the picture (M, 2) see: (M, 3)."""
     poses = np.fromfile(vectors / "short" / "track.bin", "<f4").reshape(-1, 7)
     w, x, y, z, *translation = poses[view["frame"]].astype(float)
-    R = np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-        ]
-    )
+    R = Rotation.from_quat([x, y, z, w]).as_matrix()
     w2c = np.array(view["w2c"])
     seen = np.concatenate([w2c[:, :3] @ R, (w2c[:, :3] @ translation + w2c[:, 3])[:, None]], 1)
     look, picture = player.look(np.array(view["K"]), seen, pixels), player.pictures()[view["frame"]]

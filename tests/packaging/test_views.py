@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.packaging.views import MAX_PSNR, ViewMeter
 from tests.assets import cap_mesh, cap_textures, radius_of
 from tests.scenes import look_at_origin
@@ -14,8 +13,7 @@ CAMERAS = [look_at_origin(f"c{i}", azimuth, 0, 40) for i, azimuth in enumerate((
 
 
 def meter(textures: np.ndarray) -> ViewMeter:
-    meshes: list[TexturedMesh] = [cap_mesh(radius_of(i)) for i in range(len(textures))]
-    return ViewMeter(meshes, CAMERAS, {0: list(textures)})
+    return ViewMeter([cap_mesh(radius_of(i)) for i in range(len(textures))], CAMERAS, {0: list(textures)})
 
 
 def test_the_reference_itself_is_perfect() -> None:

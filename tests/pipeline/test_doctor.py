@@ -6,6 +6,8 @@ import os
 import signal
 import subprocess
 import sys
+from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -78,12 +80,12 @@ def test_a_stage_whose_dvc_was_killed_says_what_may_be_damaged(
         assert "train: ended by SIGTERM" in told and ("`facefolds doctor` mends it" in told) is said
 
 
-def dvc(root: Path) -> tuple[int, str]:
-    command = [sys.executable, "-m", "dvc", "repro"]
-    done = subprocess.run(
-        command, cwd=root, env={**os.environ, "DVC_NO_ANALYTICS": "1"}, capture_output=True, text=True
-    )
-    return done.returncode, done.stdout + done.stderr
+def dvc(root: Path, fails: bool = False) -> str:
+    """What `dvc repro` says, having succeeded (or not)."""
+    command, variables = [sys.executable, "-m", "dvc", "repro"], {**os.environ, "DVC_NO_ANALYTICS": "1"}
+    done = subprocess.run(command, cwd=root, env=variables, capture_output=True, text=True)
+    assert (done.returncode != 0) == fails, done.stdout + done.stderr
+    return done.stdout + done.stderr
 
 
 @pytest.fixture(scope="module")
@@ -94,9 +96,16 @@ def project(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (root / ".dvc" / "config").write_text("[core]\n    analytics = false\n    no_scm = true\n")
     (root / "dvc.yaml").write_text(PIPELINE)
     (root / "in.txt").write_text("1")
-    status, output = dvc(root)
-    assert status == 0, output
+    dvc(root)
     return root
+
+
+@pytest.fixture
+def lock(project: Path) -> Iterator[Path]:
+    """Its dvc.lock, which is whole again after the test."""
+    good = (project / "dvc.lock").read_bytes()
+    yield project / "dvc.lock"
+    (project / "dvc.lock").write_bytes(good)
 
 
 def test_whole_files_are_left_alone(project: Path) -> None:
@@ -107,73 +116,48 @@ def test_whole_files_are_left_alone(project: Path) -> None:
 
 
 @pytest.mark.parametrize("name", DAMAGED)
-def test_a_damaged_dvc_lock_is_moved_away_and_nothing_runs_again(project: Path, name: str) -> None:
+def test_a_damaged_dvc_lock_is_moved_away_and_nothing_runs_again(project: Path, lock: Path, name: str) -> None:
     content = DAMAGED[name].encode(errors="surrogateescape")
-    good = (project / "dvc.lock").read_bytes()
-    (project / "dvc.lock").write_bytes(content)
+    lock.write_bytes(content)
     asked = name == "empty"  # DVC itself, which takes seconds
-    if asked:
-        status, output = dvc(project)
-        assert status != 0, output
-        assert says(output, LOCK_WORDS)
+    assert not asked or says(dvc(project, fails=True), LOCK_WORDS)
     ran = (project / "ran.txt").read_text()
     (line,) = mend(project)
     assert "dvc.lock" in line
     if asked:
-        status, output = dvc(project)
-        assert status == 0, output
+        dvc(project)
         assert (project / "ran.txt").read_text() == ran
-    (project / "dvc.lock").write_bytes(good)
-    kept = list(project.glob("dvc.lock.damaged*"))
-    assert [path.read_bytes() for path in kept] == [content]
-    for path in kept:
-        path.unlink()
+    (kept,) = project.glob("dvc.lock.damaged*")
+    assert kept.read_bytes() == content
+    kept.unlink()
 
 
 def test_a_damaged_list_of_files_in_use(project: Path) -> None:
     (project / ".dvc" / "tmp" / "rwlock").write_text("")
     (project / "dvc.lock").unlink()
-    status, output = dvc(project)
-    assert status != 0, output
-    assert says(output, RWLOCK_WORDS)
+    assert says(dvc(project, fails=True), RWLOCK_WORDS)
     (line,) = mend(project)
     assert "rwlock" in line
-    status, output = dvc(project)
-    assert status == 0, output
+    dvc(project)
 
 
-def test_earlier_damaged_ones_are_kept(project: Path) -> None:
-    good = (project / "dvc.lock").read_bytes()
+def test_earlier_damaged_ones_are_kept(project: Path, lock: Path) -> None:
     for name in ("first", "second"):
-        (project / "dvc.lock").write_text(f"{name}: [")
+        lock.write_text(f"{name}: [")
         mend(project)
     found = {path.read_text(errors="replace") for path in project.glob("dvc.lock.damaged*")}
     assert found == {"first: [", "second: ["}
-    (project / "dvc.lock").write_bytes(good)
 
 
-def test_a_dvc_at_work_is_not_disturbed(project: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    good = (project / "dvc.lock").read_bytes()
+def test_a_dvc_at_work_is_not_disturbed(project: Path, lock: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its lock is the one that DVC itself waits for."""
     monkeypatch.setattr(mending, "PATIENCE", 0.2)
-    lock = try_lock(project / ".dvc" / "tmp" / "lock")
-    assert lock is not None
-    try:
-        (project / "dvc.lock").write_text("")
+    with closing(try_lock(project / ".dvc" / "tmp" / "lock")):
+        assert "Unable to acquire lock" in dvc(project, fails=True)
+        lock.write_text("")
         with pytest.raises(UserError, match="DVC is at work"):
             mend(project)
-        assert (project / "dvc.lock").exists()
-    finally:
-        lock.close()
-        (project / "dvc.lock").write_bytes(good)
-
-
-def test_the_lock_is_the_one_that_dvc_waits_for(project: Path) -> None:
-    lock = try_lock(project / ".dvc" / "tmp" / "lock")
-    assert lock is not None
-    status, output = dvc(project)
-    lock.close()
-    assert status != 0
-    assert "Unable to acquire lock" in output
+        assert lock.exists()
 
 
 def test_the_command_says_what_it_mended(project: Path, monkeypatch: pytest.MonkeyPatch) -> None:
