@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import pytest
@@ -26,6 +26,7 @@ from tests.assets import PLAIN
 
 pytestmark = pytest.mark.slow
 
+Pixels = NDArray[np.float32]
 KEPT = {
     "psnr_any": 26.17,
     "psnr_interior": 25.31,
@@ -78,7 +79,7 @@ class Run:
     found: Found
 
 
-def judge(scene: Scene, model: Model, asset: Asset, variant: str = "asset") -> Found:
+def judge(scene: Scene, model: Model, asset: Any, variant: str = "asset") -> Found:
     result = evaluate(scene, model.manifolds, asset, EvaluateParams(films=False), Perceptual())
     metrics = metrics_json("actor", result, {})
     return Found(case="small", scores=scores_of({**metrics, "asset": metrics[variant]}))
@@ -97,12 +98,11 @@ def caught(run: Run, found: Found) -> set[str]:
 
 
 def test_the_small_film_is_as_good_as_it_was(run: Run) -> None:
-    found = {name: (kept, run.found.scores[name]) for name, kept in KEPT.items()}
-    worse = {
-        name: pair
-        for name, pair in found.items()
-        if pair[1] is None or TOLERANCES[name][0] * (pair[0] - pair[1]) > SLACK * TOLERANCES[name][1]
-    }
+    worse = {}
+    for name, kept in KEPT.items():
+        now, (sign, most, *_) = run.found.scores[name], TOLERANCES[name]
+        if now is None or sign * (kept - now) > SLACK * most:
+            worse[name] = (kept, now)
     assert not worse, f"fallen (kept, now): {worse}; all: {run.found.scores}"
 
 
@@ -123,20 +123,16 @@ class Changed:
         return iter(self.textures)
 
 
-def changed(asset: Asset, frames: list[Sequence[NDArray[np.uint8]]]) -> Asset:
-    return cast(Asset, Changed(asset, frames))
-
-
 def test_a_frame_whose_colours_are_frozen_is_caught(scene: Scene, run: Run) -> None:
     frames = list(run.asset.frames())
     frozen = [np.concatenate([old[..., :3], new[..., 3:]], -1) for old, new in zip(frames[0], frames[2], strict=True)]
-    found = judge(scene, run.model, changed(run.asset, [*frames[:2], frozen, *frames[3:]]))
+    found = judge(scene, run.model, Changed(run.asset, [*frames[:2], frozen, *frames[3:]]))
     assert {"psnr_moving", "temporal"} & caught(run, found)
 
 
 def test_textures_shifted_by_one_texel_are_caught(scene: Scene, run: Run) -> None:
     frames = [[np.roll(layer, 1, 1) for layer in frame] for frame in run.asset.frames()]
-    assert "ssim_high" in caught(run, judge(scene, run.model, changed(run.asset, frames)))
+    assert "ssim_high" in caught(run, judge(scene, run.model, Changed(run.asset, frames)))
 
 
 def test_a_missing_reflection_is_caught(scene: Scene, run: Run) -> None:
@@ -144,42 +140,41 @@ def test_a_missing_reflection_is_caught(scene: Scene, run: Run) -> None:
     assert caught(run, judge(scene, run.model, run.asset, "asset_diffuse"))
 
 
-def test_outlines_that_are_too_thin_are_caught(scene: Scene, run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+def thin_outline(alpha: Pixels) -> Pixels:
     """A fifth of the opacity is missing in the four pixels within the outline."""
-    whole = AreaView.composite
-
-    def thin(view: AreaView, *arguments: Any, **options: Any) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        rgb, alpha = whole(view, *arguments, **options)
-        edge = (alpha > 0.5) & ~binary_erosion(alpha > 0.5, iterations=4, border_value=1)
-        kept = np.where(edge, np.float32(0.8), np.float32(1))
-        return rgb * kept[..., None], alpha * kept
-
-    monkeypatch.setattr(AreaView, "composite", thin)
-    assert "opacity_edge" in caught(run, judge(scene, run.model, run.asset))
+    edge = (alpha > 0.5) & ~binary_erosion(alpha > 0.5, iterations=4, border_value=1)
+    return np.where(edge, np.float32(0.8), np.float32(1))
 
 
-def test_a_subject_that_what_stands_behind_paints_is_caught(
-    scene: Scene, run: Run, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def veil(alpha: Pixels) -> Pixels:
     """The layers leave a third of their light to a background that shows the subject: over it nothing is missing."""
+    return np.full_like(alpha, 2 / 3)
+
+
+@pytest.mark.parametrize(
+    ("kept", "worse"), [(thin_outline, {"opacity_edge"}), (veil, {"psnr_any", "opacity_inside", "worst_patch"})]
+)
+def test_opacity_that_is_missing_is_caught(
+    scene: Scene, run: Run, monkeypatch: pytest.MonkeyPatch, kept: Callable[[Pixels], Pixels], worse: set[str]
+) -> None:
     whole = AreaView.composite
 
-    def veiled(view: AreaView, *arguments: Any, **options: Any) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    def lacking(view: AreaView, *arguments: Any, **options: Any) -> tuple[Pixels, Pixels]:
         rgb, alpha = whole(view, *arguments, **options)
-        return rgb * np.float32(2 / 3), alpha * np.float32(2 / 3)
+        return rgb * kept(alpha)[..., None], alpha * kept(alpha)
 
-    monkeypatch.setattr(AreaView, "composite", veiled)
-    assert caught(run, judge(scene, run.model, run.asset)) >= {"psnr_any", "opacity_inside", "worst_patch"}
+    monkeypatch.setattr(AreaView, "composite", lacking)
+    assert caught(run, judge(scene, run.model, run.asset)) >= worse
 
 
 def test_geometry_that_drifts_is_caught(scene: Scene, run: Run) -> None:
     """All layers lie a fiftieth of the cameras' distance too far out."""
     centre = np.float32(run.asset.manifest.coordinates.sphere_centre)
-    layers = tuple(replace(layer, vertices=outwards(layer.vertices, centre, 0.02)) for layer in run.asset.layers)
+
+    def outwards(points: Pixels) -> Pixels:
+        away = points - centre
+        return points + np.float32(0.02) * away / np.linalg.norm(away, axis=1, keepdims=True)
+
+    layers = tuple(replace(layer, vertices=outwards(layer.vertices)) for layer in run.asset.layers)
     drifted = replace(run.asset, levels=(replace(run.asset.full, layers=layers),))
     assert {"psnr_any", "psnr_interior"} & caught(run, judge(scene, run.model, drifted))
-
-
-def outwards(points: NDArray[np.float32], centre: NDArray[np.float32], by: float) -> NDArray[np.float32]:
-    away = points - centre
-    return points + np.float32(by) * away / np.linalg.norm(away, axis=1, keepdims=True)
