@@ -79,10 +79,6 @@ class Project(TinyProject):
             self.seconds[name] = time.perf_counter() - start
             self.reset()
 
-    def done(self, *command: str) -> None:
-        status, output = self.run(*command)
-        assert status == 0, output
-
     def forget(self, name: str) -> None:
         """What is to be restored is not known to be there."""
         if name == "all":

@@ -7,13 +7,13 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import closing
 from pathlib import Path
 
 import psutil
 import pytest
 
 from facefolds_core.errors import UserError
-from facefolds_core.files.paths import SubjectFolders
 from facefolds_core.pipeline import running
 from facefolds_core.pipeline.running import alone
 from facefolds_core.system.locks import try_lock
@@ -50,6 +50,9 @@ def make_pipeline(folder: Path, command: str) -> None:
     (folder / "dvc.yaml").write_text(f"stages:\n  train:\n    cmd: {command}\n    outs: [data/x/model]\n")
 
 
+BY_HAND = (sys.executable, "stage.py", "--subject", "x")
+
+
 def start(folder: Path, root: Path, *command: str, **more: str) -> subprocess.Popen[str]:
     environment = own_environment(PYTHONPATH=str(root), DVC_NO_ANALYTICS="1", **more)
     return subprocess.Popen(
@@ -76,25 +79,21 @@ def has_ended(pid: int, within: float) -> bool:
 
 def test_a_second_run_is_told_who_is_at_work(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(running, "LOCK_WAIT", 0.2)
-    folders = SubjectFolders(tmp_path / "x")
+    locks = tmp_path / "locks"
     says = f"another run of train is at work: process {os.getpid()}"
-    with (
-        alone("train", folders.root / "locks"),
-        alone("sample", folders.root / "locks"),
-        pytest.raises(UserError, match=says),
-    ):
-        alone("train", folders.root / "locks").__enter__()
-    with alone("train", folders.root / "locks"):
+    with alone("train", locks), alone("sample", locks), pytest.raises(UserError, match=says):
+        alone("train", locks).__enter__()
+    with alone("train", locks):
         pass
 
 
 def test_a_killed_run_keeps_nobody_out(folder: Path, project_root: Path) -> None:
-    process = start(folder, project_root, sys.executable, "stage.py", "--subject", "x")
+    process = start(folder, project_root, *BY_HAND)
     wait_for(folder / "ready")
     process.kill()
     process.communicate()
     (folder / "seconds").write_text("0")
-    process = start(folder, project_root, sys.executable, "stage.py", "--subject", "x")
+    process = start(folder, project_root, *BY_HAND)
     output, _ = process.communicate(timeout=30)
     assert process.returncode == 0, output
     assert sorted(p.name for p in (folder / "data" / "x").iterdir()) == ["locks", "model"]
@@ -132,10 +131,8 @@ def test_what_ends_while_another_dvc_holds_the_lock_is_recorded(folder: Path, pr
     (folder / "seconds").write_text("1")
     process = start(folder, project_root, sys.executable, "-m", "dvc", "repro")
     wait_for(folder / "ready")
-    lock = try_lock(folder / ".dvc" / "tmp" / "lock")
-    assert lock is not None
-    time.sleep(6)
-    lock.close()
+    with closing(try_lock(folder / ".dvc" / "tmp" / "lock")):
+        time.sleep(6)
     output, _ = process.communicate(timeout=30)
     assert process.returncode == 0, output
     assert "waiting for another DVC" in output

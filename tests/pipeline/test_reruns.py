@@ -27,8 +27,7 @@ def project(project_root: Path, tmp_path_factory: pytest.TempPathFactory) -> Tin
 
 
 def ran(project: TinyProject) -> list[str]:
-    status, output = project.repro("capture@one", "capture@two")
-    assert status == 0, output
+    output = project.done("dvc", "repro", "capture@one", "capture@two")
     return sorted(re.findall(r"^Running stage '(.+)':", output, flags=re.MULTILINE))
 
 

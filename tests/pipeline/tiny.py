@@ -95,6 +95,12 @@ class TinyProject:
         output, _ = process.communicate(timeout=900)
         return process.returncode, output
 
+    def done(self, *command: str) -> str:
+        """Output of a command that must succeed."""
+        status, output = self.run(*command)
+        assert status == 0, output
+        return output
+
     def repro(self, *targets: str) -> tuple[int, str]:
         return self.run("dvc", "repro", *targets)
 
