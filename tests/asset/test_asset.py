@@ -11,7 +11,6 @@ import pytest
 from facefolds_core.asset import read_asset
 from facefolds_core.asset.validation import validate_asset
 from facefolds_core.errors import UserError
-from facefolds_core.files.frame_store import write_frames
 from facefolds_core.geometry.meshes import TexturedMesh
 from tests.assets import PLAIN, SOURCE, WINDOW, cap_crops, cap_mesh, cap_textures, make_asset, write_asset, write_store
 
@@ -69,17 +68,7 @@ def test_static_scene(tmp_path: Path) -> None:
     assert (len(list(asset.frames())), len(asset.frame(0))) == (1, 3)
 
 
-def test_failure_leaves_the_old_asset(tmp_path: Path) -> None:
-    make_asset(tmp_path / "asset")
-    before = {file.name: file.read_bytes() for file in (tmp_path / "asset").iterdir()}
-    write_frames(tmp_path / "part.arrow", (64, 64, 4), [(0, 0, cap_textures(1, 0, 64)[0])])
-    store = write_store(tmp_path / "one.arrow", cap_textures(1, 0, 64)[None])
-    with pytest.raises(UserError, match="not complete"):
-        write_asset(tmp_path / "asset", [cap_mesh(0.4), cap_mesh(0.3)], [WINDOW] * 2, store, SOURCE, PLAIN)
-    assert {file.name: file.read_bytes() for file in (tmp_path / "asset").iterdir()} == before
-
-
-def test_bad_meshes_are_refused(tmp_path: Path) -> None:
+def test_bad_meshes_and_incomplete_textures_are_refused(tmp_path: Path) -> None:
     store = write_store(tmp_path / "textures.arrow", cap_textures(1, 0, 64)[None])
     good = cap_mesh(0.4)
     nan = good.vertices.copy()
@@ -93,4 +82,6 @@ def test_bad_meshes_are_refused(tmp_path: Path) -> None:
     for word, mesh in bad.items():
         with pytest.raises(UserError, match=word):
             write_asset(tmp_path / "asset", [mesh], [WINDOW], store, SOURCE, PLAIN)
+    with pytest.raises(UserError, match="not complete"):
+        write_asset(tmp_path / "asset", [good] * 2, [WINDOW] * 2, store, SOURCE, PLAIN)
     assert not (tmp_path / "asset").exists()

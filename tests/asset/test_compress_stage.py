@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -97,6 +98,16 @@ def test_textures_too_large_for_a_video_are_refused_before_anything_is_encoded(
         compress(folders)
     assert "texture.resolution" in str(caught.value.remedy)
     assert not folders.asset.exists()
+
+
+def test_a_failure_on_the_way_leaves_the_old_asset(folders: SubjectFolders, monkeypatch: pytest.MonkeyPatch) -> None:
+    write_text(folders.asset / "manifest.json", "old")
+    encode = Mock(side_effect=UserError("the disk is full"))
+    monkeypatch.setattr("facefolds_core.asset.parts.encode_video", encode)
+    with pytest.raises(UserError, match="full"):
+        compress(folders)
+    assert encode.called
+    assert [(path.name, path.read_text()) for path in folders.asset.iterdir()] == [("manifest.json", "old")]
 
 
 def test_mesh_error_in_pixels(folders: SubjectFolders) -> None:
