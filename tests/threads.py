@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import TypeVar
 
 import numba
+
+T = TypeVar("T")
 
 
 @contextmanager
@@ -17,3 +20,12 @@ def on_threads(count: int) -> Iterator[None]:
         yield
     finally:
         numba.set_num_threads(before)
+
+
+def each_of(counts: tuple[int, ...], work: Callable[[], T]) -> list[T]:
+    """What is computed on each of these numbers of threads."""
+    found = []
+    for count in counts:
+        with on_threads(count):
+            found.append(work())
+    return found

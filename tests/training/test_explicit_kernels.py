@@ -14,7 +14,7 @@ from facefolds_core.training.explicit import adam_kernel, shading_kernel
 from facefolds_core.training.explicit.adam_kernel import smooth
 from facefolds_core.training.explicit.rates import BETAS
 from facefolds_core.training.explicit.state import MIN_ALPHA, MIN_LIGHT
-from tests.threads import on_threads
+from tests.threads import each_of
 from tests.training import reference
 
 WINDOW = (-0.5, 0.4, -0.3, 0.6)
@@ -49,6 +49,14 @@ def _problem(rays: int, layers: int, shape: tuple[int, int]) -> dict[str, np.nda
     }
 
 
+def _shaded(p: dict[str, np.ndarray], *settings: object) -> tuple[np.ndarray, float]:
+    """What the kernel adds to nothing, (H, W, N, 4), and what it returns."""
+    height, width, layers, _ = p["texture"].shape
+    sums = np.zeros((layers, height, width, 4), np.float32)
+    squares = shading_kernel.shade(*p.values(), sums, *settings)
+    return sums.transpose(1, 2, 0, 3), squares
+
+
 SETTINGS = {"rounds of geometry": (0.0, MIN_LIGHT), "textures": (MIN_ALPHA, MIN_LIGHT), "stronger": (0.05, 0.1)}
 """What is faint, what is hidden: as in production, and one that shows."""
 
@@ -59,29 +67,26 @@ def test_shading_matches_autograd(rays: int, layers: int, shape: tuple[int, int]
     """With the settings of `fast`, and alphas of which a third is faint: what a GPU trains is what a CPU trains."""
     p = _problem(rays, layers, shape)
     p["texture"][..., 3] *= np.random.default_rng(1).choice([0.003, 0.3, 1.9], (*shape, layers))
-    gradient = np.zeros((layers, *shape, 4), np.float32)
-    squares = shading_kernel.shade(*p.values(), gradient, *SETTINGS[setting], False)
+    gradient, squares = _shaded(p, *SETTINGS[setting], False)
     expected, total = reference.shade(*_in_torch(p), *SETTINGS[setting])
     # Worst seen 1.4e-6 of gradients up to 2.3; 1.8 by a reference that does not leave out what is faint.
-    torch.testing.assert_close(torch.from_numpy(gradient).permute(1, 2, 0, 3), expected, atol=1e-5, rtol=0)
+    torch.testing.assert_close(torch.from_numpy(gradient), expected, atol=1e-5, rtol=0)
     assert squares == pytest.approx(float(total), rel=1e-5)  # seen: 4e-7
 
 
 @pytest.mark.parametrize("least", [MIN_LIGHT, 0.3])
 def test_errors_by_texel_match_autograd(least: float) -> None:
     p = _problem(600, 4, (9, 7))
-    sums = np.zeros((4, 9, 7, 4), np.float32)
-    shading_kernel.shade(*p.values(), sums, 0.0, least, True)
     expected = reference.errors_by_texel(*_in_torch(p), least)
-    torch.testing.assert_close(torch.from_numpy(sums).permute(1, 2, 0, 3), expected, atol=2e-5, rtol=0)
+    torch.testing.assert_close(torch.from_numpy(_shaded(p, 0.0, least, True)[0]), expected, atol=2e-5, rtol=0)
 
 
 def test_what_is_cut_out_needs_no_layers_where_it_is_clear() -> None:
     """A pixel beside the subject has the colour behind: no layer explains it, and each is asked to go, at a price."""
     p = _problem(50, 3, (6, 6))
     p["cut"][:], p["texture"][..., 3] = 0, 0
-    gradient = np.zeros((3, 6, 6, 4), np.float32)
-    assert shading_kernel.shade(*p.values(), gradient, 0.0, MIN_LIGHT, False) == pytest.approx(0, abs=1e-9)
+    gradient, squares = _shaded(p, 0.0, MIN_LIGHT, False)
+    assert squares == pytest.approx(0, abs=1e-9)
     assert np.abs(gradient[..., :3]).max() < 1e-5
     assert gradient[..., 3].min() >= 0
     met = (p["codes"][p["which"] < 0, :, 0] > 0).sum() + (p["finer"][..., 0] > 0).sum() / 4
@@ -102,21 +107,14 @@ def _in_torch(p: dict[str, np.ndarray]) -> list[torch.Tensor]:
 def test_shading_at_extreme_alphas(alpha: float) -> None:
     p = _problem(50, 4, (6, 6))
     p["texture"][..., 3] = alpha
-    gradient = np.zeros((4, 6, 6, 4), np.float32)
-    assert np.isfinite(shading_kernel.shade(*p.values(), gradient, 0.0, MIN_LIGHT, False))
-    assert np.isfinite(gradient).all()
+    assert all(np.isfinite(found).all() for found in _shaded(p, 0.0, MIN_LIGHT, False))
 
 
 def test_shading_does_not_depend_on_the_number_of_threads() -> None:
-    results = []
-    for threads in (1, 2, 4):
-        p = _problem(2 * scatter.CHUNK + 1000, 6, (9, 9))
-        gradient = np.zeros((6, 9, 9, 4), np.float32)
-        with on_threads(threads):
-            squares = shading_kernel.shade(*p.values(), gradient, 0.0, MIN_LIGHT, False)
-        results.append((gradient, squares))
-    for other in results[1:]:
-        for a, b in zip(results[0], other, strict=True):
+    p = _problem(2 * scatter.CHUNK + 1000, 6, (9, 9))
+    first, *others = each_of((1, 2, 4), lambda: _shaded(p, 0.0, MIN_LIGHT, False))
+    for other in others:
+        for a, b in zip(first, other, strict=True):
             np.testing.assert_array_equal(a, b)
 
 
@@ -143,14 +141,9 @@ def test_adam_step_matches_the_reference(betas: tuple[float, float]) -> None:
     rates = torch.tensor([0.02, 0.006, 0.3, 0.01, 0.15])
     correct = torch.tensor([1.5, 2.0, 4.0, 6.0])
     compiled = [p.clone() for p in parts]
-    adam_kernel.adam_step(
-        *(p.numpy() for p in compiled),
-        texture.numpy(),
-        gradient.permute(1, 0, 2).contiguous().numpy(),
-        rates.numpy(),
-        correct.numpy(),
-        decays(betas),
-    )
+    pushed = gradient.permute(1, 0, 2).contiguous().numpy()
+    given = *(p.numpy() for p in compiled), texture.numpy(), pushed, rates.numpy(), correct.numpy()
+    adam_kernel.adam_step(*given, decays(betas))
     reference.adam_step(*parts, texture, gradient, rates, correct, betas)
     for a, b in zip(compiled, parts, strict=True):
         torch.testing.assert_close(a, b, atol=1e-5, rtol=1e-4)

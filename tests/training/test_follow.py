@@ -14,7 +14,7 @@ from facefolds_core.training.explicit.rates import ALPHA_RATE, BETAS
 from facefolds_core.training.explicit.state import MIN_LIGHT, TextureState
 from facefolds_core.training.explicit.targets import ALL_COLOURS
 from facefolds_core.training.explicit.views import StillRays, Views
-from tests.threads import on_threads
+from tests.threads import each_of
 from tests.training import reference
 from tests.training.rays import one_each
 
@@ -35,11 +35,12 @@ def random_texture() -> np.ndarray:
 
 
 def test_light_on_chosen_texels_matches_the_reference() -> None:
-    views, texture = random_views(), random_texture()
-    chosen = np.random.default_rng(3).random(SHAPE) < 0.5
-    found = follow_kernel.light_on(views.codes, texture, chosen, MIN_LIGHT)
-    given = torch.from_numpy(views.codes.astype(np.int32)), torch.from_numpy(texture), torch.from_numpy(chosen)
-    torch.testing.assert_close(torch.from_numpy(found), reference.light_on(*given, MIN_LIGHT), atol=1e-6, rtol=0)
+    given = random_views().codes, random_texture(), np.random.default_rng(3).random(SHAPE) < 0.5
+    found = follow_kernel.light_on(*given, MIN_LIGHT)
+    expected = reference.light_on(
+        torch.from_numpy(given[0].astype(np.int32)), *map(torch.from_numpy, given[1:]), MIN_LIGHT
+    )
+    torch.testing.assert_close(torch.from_numpy(found), expected, atol=1e-6, rtol=0)
 
 
 def test_a_step_matches_the_reference_and_leaves_other_texels() -> None:
@@ -98,24 +99,32 @@ class Film:
         self.truth = np.tile(self.usual, (self.frames, self.rays, 1))
         self.truth[self.moved, ((place > 0.3) & (place < 0.6)).all(1)] = self.other
         self.images = np.rint(255 * (self.truth + noise * rng.normal(size=self.truth.shape)).clip(0, 1))
+        self.opaque = np.full((self.rays, 1), 255)
+        self.state = self.of_layers(9.0)
 
     def cut(self, index: int) -> np.ndarray:
-        opaque = np.full((self.rays, 1), 255)
-        return np.concatenate([self.images[index], opaque], -1).astype(np.uint8)[None]
+        return np.concatenate([self.images[index], self.opaque], -1).astype(np.uint8)[None]
 
     def average(self) -> None:
         self.behind[:] = ALL_COLOURS
 
-    def state(self) -> TextureState:
+    def of_layers(self, *logits: float) -> TextureState:
+        """All of the usual colour."""
         start = torch.tensor(self.usual, dtype=torch.float32).expand(2, 2, 3)
-        state = TextureState(self.shape, 1, self.frames, start, PARAMS)
-        state.layers[0, ..., 3] = 9
+        state = TextureState(self.shape, len(logits), self.frames, start, PARAMS)
+        state.layers[0, ..., 3] = torch.tensor(logits)
         return state
 
-    def error(self, state: TextureState, frame: int) -> float:
+    def followed(self) -> tuple[np.ndarray, float]:
+        return follow(self.state, self.source, self, RATES, unlit)
+
+    def errors(self, frame: int) -> np.ndarray:
+        return mean_errors(self.state, self.source, self, frame, unlit)
+
+    def error(self, frame: int) -> float:
         """RMS over the rays of a frame in the patch, a texel from its edge."""
         codes = torch.from_numpy(self.source.views.codes.astype(np.int32))
-        seen = reference.look_up(codes, state.activated(frame).view(*self.shape, 1, 4))[:, 0, :3].numpy()
+        seen = reference.look_up(codes, self.state.activated(frame).view(*self.shape, 1, 4))[:, 0, :3].numpy()
         return float(np.sqrt(((seen - self.truth[frame])[self.inside] ** 2).mean()))
 
 
@@ -125,10 +134,10 @@ def unlit(state: TextureState, views: Views, frame: int) -> None:
 
 def test_a_patch_that_changes_in_one_frame_is_followed() -> None:
     film = Film()
-    state = film.state()
-    assert film.error(state, film.moved) > 0.4
-    _, share = follow(state, film.source, film, RATES, unlit)
-    assert film.error(state, film.moved) < 0.04
+    state = film.state
+    assert film.error(film.moved) > 0.4
+    _, share = film.followed()
+    assert film.error(film.moved) < 0.04
     for frame in set(range(film.frames)) - {film.moved}:
         assert not state.frame_colour[0, frame].any() and not state.frame_alpha[0, frame].any()
     assert 0 < share < 0.1
@@ -140,40 +149,34 @@ def test_a_patch_that_changes_in_one_frame_is_followed() -> None:
 def test_noise_and_what_all_frames_show_are_no_motion() -> None:
     film = Film(noise=0.02)
     film.images[film.moved] = film.images[0]
-    state = film.state()
-    state.colour[0] += 0.1  # wrong, in all frames alike
-    usual, share = follow(state, film.source, film, RATES, unlit)
+    film.state.colour[0] += 0.1  # wrong, in all frames alike
+    usual, share = film.followed()
     assert share == 0 and usual.min() > 0.09
-    assert not state.frame_colour.any()
+    assert not film.state.frame_colour.any()
 
 
 def test_mean_errors_are_those_of_the_texture() -> None:
     film = Film()
     film.images[:] = np.rint(255 * film.usual)
-    state = film.state()
-    state.frame_colour[0, 1] += torch.tensor([0.1, 0.0, -0.05])
-    errors = mean_errors(state, film.source, film, 1, unlit)
-    np.testing.assert_allclose(errors, np.tile([0.1, 0.0, -0.05], (256, 1)), atol=3e-3)  # alpha .9999, 8 bits
+    film.state.frame_colour[0, 1] += torch.tensor([0.1, 0.0, -0.05])
+    np.testing.assert_allclose(film.errors(1), np.tile([0.1, 0.0, -0.05], (256, 1)), atol=3e-3)  # alpha .9999, 8 bits
 
 
 def test_a_frame_alone_goes_towards_its_pictures() -> None:
     film = Film()
-    state = film.state()
-    errors = mean_errors(state, film.source, film, film.moved, unlit)
+    errors = film.errors(film.moved)
     chosen = lagging(errors, film.shape, PARAMS.follow.min_error)
-    follow_frame(state, film.source, film, film.moved, chosen, errors, RATES, unlit)
-    assert film.error(state, film.moved) < 0.04
+    follow_frame(film.state, film.source, film, film.moved, chosen, errors, RATES, unlit)
+    assert film.error(film.moved) < 0.04
 
 
 def test_following_does_not_depend_on_the_number_of_threads() -> None:
-    found = []
-    for threads in (1, 2):
+    def followed() -> torch.Tensor:
         film = Film()
-        state = film.state()
-        with on_threads(threads):
-            follow(state, film.source, film, RATES, unlit)
-        found.append(state.frame_colour.clone())
-    assert torch.equal(*found)
+        film.followed()
+        return film.state.frame_colour
+
+    assert torch.equal(*each_of((1, 2), followed))
 
 
 def test_where_everything_moves_a_step_takes_a_quarter_of_a_usual_one() -> None:
@@ -193,13 +196,12 @@ def test_texels_with_a_gradient_are_all_known() -> None:
 
 def test_where_something_moves_all_frames_are_asked_by_their_whole_error() -> None:
     film = Film()
-    state = film.state()
-    state.colour[0] += 0.1  # as a mean over the frames would be
-    usual, _ = follow(state, film.source, film, RATES, unlit)
-    followed = state.frame_colour[0].abs().amax(-1) > 0
-    assert followed[0].any() and not followed[0].all()
-    assert not usual[followed[0].numpy()].any()
-    assert all(film.error(state, frame) < 0.04 for frame in range(film.frames))
+    film.state.colour[0] += 0.1  # as a mean over the frames would be
+    usual, _ = film.followed()
+    first = film.state.frame_colour[0, 0].abs().amax(-1).numpy() > 0
+    assert first.any() and not first.all()
+    assert not usual[first].any()
+    assert all(film.error(frame) < 0.04 for frame in range(film.frames))
 
 
 def test_what_is_seen_against_nothing_stays_transparent() -> None:
@@ -213,12 +215,8 @@ def test_what_is_seen_against_nothing_stays_transparent() -> None:
     film.images[:] = 255 * film.usual
     film.images[film.moved] = 255 * film.other
     film.images[:, alone] = 0
-    opaque = np.full((film.rays, 1), 255)
-    opaque[alone] = 0
-    film.cut = lambda index: np.concatenate([film.images[index], opaque], -1).astype(np.uint8)[None]  # type: ignore[method-assign]
-    start = torch.tensor(film.usual, dtype=torch.float32).expand(2, 2, 3)
-    state = TextureState(film.shape, 2, film.frames, start, PARAMS)
-    state.layers[0, ..., 3] = torch.tensor([-3.0, 9.0])
-    _, share = follow(state, film.source, film, RATES, unlit)
+    film.opaque[alone] = 0
+    film.state = film.of_layers(-3.0, 9.0)
+    _, share = film.followed()
     assert share > 0.1
-    assert state.activated(film.moved)[:, 0, 3].max() < 0.1
+    assert film.state.activated(film.moved)[:, 0, 3].max() < 0.1

@@ -34,7 +34,7 @@ from facefolds_core.training.explicit.reflection_maps import (
     tilted,
     values_at,
 )
-from tests.threads import on_threads
+from tests.threads import each_of
 from tests.training import reference
 from tests.training.rays import one_each
 from tests.training.test_explicit_kernels import random_cut
@@ -53,9 +53,14 @@ def _random_maps(seed: int = 0, shape: tuple[int, int] = (8, 8)) -> Maps:
     return Maps(*(np.asarray(x, np.float32) for x in (gloss, offset, surface, np.zeros((*shape, 2)), light)))
 
 
-def _rays(count: int, seed: int = 1) -> tuple[np.ndarray, np.ndarray]:
+TRUTH = _random_maps(3)
+START = Maps.blank(TRUTH.normals, KEYS)
+"""The right normals, nothing else known."""
+
+
+def _rays(count: int) -> tuple[np.ndarray, np.ndarray]:
     """Places, and directions from before the face."""
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(1)
     along = np.stack([-np.ones(count), *rng.uniform(-0.8, 0.8, (2, count))], -1)
     along /= np.linalg.norm(along, axis=1, keepdims=True)
     return rng.random((count, 2), np.float32), along.astype(np.float32)
@@ -108,8 +113,7 @@ def test_look_is_the_difference_of_cut_out_and_reference() -> None:
     st = (torch.from_numpy(codes.astype(np.float32)) - 1) / 65534
     colour = (weights[..., None] * rgba[..., :3]).sum(1) + through[:, None] * torch.from_numpy(behind)
     wanted = reference.over(torch.from_numpy(cut[0]) / 255, torch.from_numpy(behind))
-    expected = torch.cat([wanted - colour, 1 - through[:, None]], 1)
-    expected = torch.cat([expected, (weights[..., None] * st).sum(1)], 1)
+    expected = torch.cat([wanted - colour, 1 - through[:, None], (weights[..., None] * st).sum(1)], 1)
     torch.testing.assert_close(torch.from_numpy(seen), expected, atol=5e-3, rtol=0)  # what lies behind T < 0.002
 
 
@@ -122,20 +126,12 @@ def test_normal_equations_are_those_of_a_dense_matrix() -> None:
     normal_equations(st, weight, wish, h, w, band, right)
     rows = np.stack([values_at(one.reshape(h, w, 1), st) for one in np.eye(h * w, dtype=np.float32)], 1)[..., 0]
     full = (rows * weight[:, None]).T @ rows
-    found = np.zeros_like(full)
-    for below in range(w + 2):
-        for column in range(h * w - below):
-            found[column + below, column] = band[below, column]
-    np.testing.assert_allclose(found, np.tril(full), atol=1e-4)
+    found = [np.diagflat(diagonal[: h * w - below], -below) for below, diagonal in enumerate(band)]
+    np.testing.assert_allclose(sum(found), np.tril(full), atol=1e-4)
     np.testing.assert_allclose(right, rows.T @ wish, atol=1e-4)
 
 
-def _start(truth: Maps) -> Maps:
-    """The right normals, nothing else known."""
-    return Maps.blank(truth.normals, KEYS)
-
-
-def _seen(maps: Maps, strength: float, turned: bool = False) -> Seen:
+def _seen(strength: float, turned: bool = False, maps: Maps = TRUTH) -> Seen:
     """Rays of eight cameras whose photos show `strength` times a known reflection, its mean in the layers."""
     looked = _looked(*_rays(20_000), _turns(20_000) if turned else None)
     rng, count = np.random.default_rng(2), len(looked.st)
@@ -146,10 +142,8 @@ def _seen(maps: Maps, strength: float, turned: bool = False) -> Seen:
 
 @pytest.mark.parametrize("turned", [False, True])
 def test_a_known_reflection_is_found(turned: bool) -> None:
-    truth = _random_maps(3)
-    seen = _seen(truth, 0.2, turned=turned)
-    start = _start(truth)
-    found = centred(fit_maps(seen, start, 12, PARAMS), seen, PARAMS)
+    seen = _seen(0.2, turned)
+    found = centred(fit_maps(seen, START, 12, PARAMS), seen, PARAMS)
     left = seen.residual - found.added(seen)
     noise = 1e-4
     assert left.var() - noise < 0.1 * (seen.residual.var() - noise)  # seen: 0.07
@@ -157,19 +151,17 @@ def test_a_known_reflection_is_found(turned: bool) -> None:
 
 
 def test_light_begins_at_nothing_and_the_sum_stays() -> None:
-    maps, (st, along) = _random_maps(3), _rays(500)
-    lit = replace(maps, environment=maps.environment - np.float32(0.7))
+    looked = _looked(*_rays(500))
+    lit = replace(TRUTH, environment=TRUTH.environment - np.float32(0.7))
     found = grounded(lit)
     assert found.environment.min() == 0
-    np.testing.assert_allclose(found.added(_looked(st, along)), lit.added(_looked(st, along)), atol=1e-5)
+    np.testing.assert_allclose(found.added(looked), lit.added(looked), atol=1e-5)
 
 
 @pytest.mark.parametrize("strength, helps", [(0.2, True), (0.0, False)])
 def test_whether_it_helps_is_asked_of_other_cameras(strength: float, helps: bool) -> None:
     """On matte noise a fit always gains on its own rays, and nothing on others."""
-    truth = _random_maps(3)
-    start = _start(truth)
-    assert (gain_on_cameras(_seen(truth, strength), start, PARAMS) >= PARAMS.min_gain) == helps
+    assert (gain_on_cameras(_seen(strength), START, PARAMS) >= PARAMS.min_gain) == helps
 
 
 @pytest.mark.parametrize(
@@ -185,10 +177,9 @@ def test_whether_it_helps_is_asked_of_other_cameras(strength: float, helps: bool
 def test_a_smoother_one_is_asked_for_where_little_is_gained(
     fine: float, smooth: float, kind: str, times: float
 ) -> None:
-    truth = _random_maps(3)
-    seen, start = _seen(truth, 0.2), _start(truth)
+    seen = _seen(0.2)
     gloss = GlossFit(Chart((0.0, 0.0, 0.0)), WINDOW, KEYS, None)
-    gloss.maps, gloss._normals = start, start.surface
+    gloss.maps, gloss._normals = START, START.surface
     state = SimpleNamespace(shine=np.ones((3, 3), np.float32))
 
     def gain(_: Seen, __: Maps, asked: GlossParams) -> float:
@@ -199,12 +190,12 @@ def test_a_smoother_one_is_asked_for_where_little_is_gained(
     assert (found.kind, gloss.smoother, gloss.on) == (kind, times, kind != "no_reflection")
     assert found.values["gain"] == (fine if kind == "reflection" else smooth)
     if kind == "reflection":
-        assert gloss.maps is start and len(state.shine) == 3
+        assert gloss.maps is START and len(state.shine) == 3
     elif kind == "no_reflection":
         assert gloss.maps is None and len(state.shine) == 0
     else:
         params = smoothed(PARAMS, 10.0)
-        expected = centred(grounded(fit_maps(seen, start, PARAMS.first_rounds, params)), seen, params)
+        expected = centred(grounded(fit_maps(seen, START, PARAMS.first_rounds, params)), seen, params)
         assert gloss.maps is not None and len(state.shine) == len(seen.st)
         for field in fields(Maps):
             np.testing.assert_allclose(getattr(gloss.maps, field.name), getattr(expected, field.name), atol=1e-6)
@@ -212,20 +203,15 @@ def test_a_smoother_one_is_asked_for_where_little_is_gained(
 
 def test_light_that_stays_with_the_room_is_not_taken_for_the_heads() -> None:
     """Of a head that turns, a fit that lets the light turn with it explains less on cameras that it did not see."""
-    truth = _random_maps(3)
-    seen, start = _seen(truth, 0.2, turned=True), _start(truth)
-    gains = [gain_on_cameras(rays, start, PARAMS) for rays in (seen, replace(seen, turns=None))]
+    seen = _seen(0.2, turned=True)
+    gains = [gain_on_cameras(rays, START, PARAMS) for rays in (seen, replace(seen, turns=None))]
     assert gains[0] > gains[1] + 1  # dB
 
 
 def test_the_fit_does_not_depend_on_threads() -> None:
-    truth = _random_maps(3)
-    seen, found = _seen(truth, 0.2), []
-    for threads in (1, 2):
-        with on_threads(threads):
-            found.append(fit_maps(seen, truth, 3, PARAMS))
-    names = [field.name for field in fields(Maps)]
-    assert all(np.array_equal(getattr(found[0], name), getattr(found[1], name)) for name in names)
+    seen = _seen(0.2)
+    one, two = each_of((1, 2), lambda: fit_maps(seen, TRUTH, 3, PARAMS))
+    assert all(np.array_equal(getattr(one, field.name), getattr(two, field.name)) for field in fields(Maps))
 
 
 def test_normals_of_a_sphere_are_its_directions() -> None:
@@ -244,21 +230,18 @@ def test_tangents_are_at_right_angles_to_the_normal_and_to_each_other() -> None:
 
 def test_normals_lean_as_the_reflection_asks_for() -> None:
     """Given the surface of a truth that leans by 0.15 in a random direction everywhere."""
-    given, rng = _random_maps(3), np.random.default_rng(5)
-    angle = rng.uniform(0, 2 * np.pi, given.gloss.shape)
+    angle = np.random.default_rng(5).uniform(0, 2 * np.pi, TRUTH.gloss.shape)
     tilt = np.asarray(0.15 * np.stack([np.cos(angle), np.sin(angle)], -1), np.float32)
-    truth = replace(given, tilt=tilt)
-    seen, start = _seen(truth, 1.0), replace(given, tilt=np.zeros_like(tilt))
-    found = fit_maps(seen, start, 12, replace(PARAMS, normal_smoothness=0.01))
+    seen = _seen(1.0, maps=replace(TRUTH, tilt=tilt))
+    found = fit_maps(seen, TRUTH, 12, replace(PARAMS, normal_smoothness=0.01))
     assert np.median(np.linalg.norm(found.tilt - tilt, axis=-1)) < 0.05
     assert np.abs(found.tilt).max() <= PARAMS.max_tilt
 
 
 def test_normals_stay_where_they_are_asked_to() -> None:
-    truth = _random_maps(3)
-    found = fit_maps(_seen(truth, 0.2), _start(truth), 2, replace(PARAMS, max_tilt=0.0))
+    found = fit_maps(_seen(0.2), START, 2, replace(PARAMS, max_tilt=0.0))
     np.testing.assert_array_equal(found.tilt, 0)
-    np.testing.assert_allclose(found.normals, tilted(truth.surface, 0 * truth.tilt))
+    np.testing.assert_allclose(found.normals, tilted(TRUTH.surface, 0 * TRUTH.tilt))
 
 
 def test_a_ray_reflects_at_the_layer_nearest_to_the_middle() -> None:
