@@ -14,6 +14,11 @@ from facefolds_core.training.explicit.state import BELIEF, FAINT, MAX_OPACITY, M
 from tests.training.rays import one_each
 
 
+def grey() -> TextureState:
+    """Of two frames, three layers of 24 texels."""
+    return TextureState((4, 6), 3, 2, torch.full((2, 2, 3), 0.5), ExplicitParams())
+
+
 def test_layers_begin_with_what_is_given_and_keep_what_they_have_learnt() -> None:
     rng = np.random.default_rng(0)
     start = torch.tensor([0.3, 0.4, 0.5]).expand(2, 2, 3)
@@ -35,7 +40,7 @@ def test_layers_begin_with_what_is_given_and_keep_what_they_have_learnt() -> Non
 
 
 def test_a_frame_begins_with_an_opacity_of_its_own() -> None:
-    state = TextureState((4, 6), 3, 2, torch.full((2, 2, 3), 0.5), ExplicitParams())
+    state = grey()
     usual, own = np.random.default_rng(0).uniform(0.1, 0.9, (2, 24, 3)).astype(np.float32)
     state.fill(usual)
     state.fill_frame(1, own)
@@ -47,7 +52,7 @@ def test_a_frame_begins_with_an_opacity_of_its_own() -> None:
 
 def test_steps_draw_opacity_back_to_what_is_believed() -> None:
     """A step on rays that meet nothing changes logits by this alone: of the difference 1 - BELIEF is left."""
-    state = TextureState((4, 6), 3, 2, torch.full((2, 2, 3), 0.5), ExplicitParams())
+    state = grey()
     state.fill(np.full((24, 3), 0.5, np.float32))
     views = one_each(np.zeros((2, 3, 2), np.uint16))
     step = partial(state.step, views, np.arange(2), OneColour(), 0, 0.0, np.full(5, 0.1, np.float32))
@@ -82,24 +87,16 @@ class OneColour:
         return np.full((1, 2, 4), 255, np.uint8)
 
 
-def _head() -> np.ndarray:
+def test_a_splinter_goes_with_fog_and_the_head_with_its_soft_edge_stays() -> None:
+    """And a large second body."""
     opacity = np.zeros((60, 60))
     opacity[10:50, 10:40] = 1.0
-    return opacity
-
-
-def test_a_splinter_goes_with_fog_and_the_head_with_its_soft_edge_stays() -> None:
-    opacity = _head()
     opacity[30:34, 50:52] = 0.8
     opacity[20, 40:42] = 0.1  # hair
     opacity[2:5, 50:58] = 0.1  # fog
     apart = loose(opacity)
     assert apart[30:34, 50:52].all() and apart[2:5, 50:58].all()
     assert not apart[10:50, 10:40].any() and not apart[20, 40:42].any()
-
-
-def test_a_large_second_body_stays() -> None:
-    opacity = _head()
     opacity[10:50, 48:55] = 0.8  # a fifth of the head's
     assert not loose(opacity)[10:50, 48:55].any()
 

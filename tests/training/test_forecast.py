@@ -58,6 +58,5 @@ def test_what_cannot_fit_is_refused_with_numbers(tmp_path: Path) -> None:
 
 
 def test_it_is_told_in_words() -> None:
-    assert str(Forecast(24, 4_000_000_000, 3_600_000_000, 600.0)) == (
-        "in segments over 24 key frames: about 10 minutes, 4.0 GB of memory, 3.60 GB on the disk"
-    )
+    told = str(Forecast(24, 4_000_000_000, 3_600_000_000, 600.0))
+    assert all(part in told for part in ("24 key frames", "10 minutes", "4.0 GB of memory", "3.60 GB on the disk"))

@@ -13,7 +13,7 @@ from facefolds_core.captures.scene import Scene
 from facefolds_core.geometry.chart import Chart
 from facefolds_core.geometry.track import Track
 from facefolds_core.model.radial import RadialManifolds
-from facefolds_core.training.explicit.views import MovingRays, first_pixel, trace_views
+from facefolds_core.training.explicit.views import MovingRays, Views, first_pixel, trace_views
 from facefolds_core.training.rays import RaySampler
 from tests.geometry.test_track import about
 from tests.scenes import CENTRE, make_scene
@@ -37,26 +37,27 @@ def rays(scene: Scene, stride: int = 1, share: float = 400.0, reserve: float = 0
     return MovingRays(scene, layers(), stride, share, shares=shares, sample=1, reserve=reserve)
 
 
+def rows_of(views: Views) -> dict[tuple[int, int], tuple[int, ...]]:
+    """(camera, pixel) -> codes."""
+    rays = zip(views.camera, views.pixel, views.codes, strict=True)
+    return {(int(c), int(p)): tuple(codes.ravel().tolist()) for c, p, codes in rays}
+
+
 def seen(found: MovingRays, frame: int, parts: int) -> dict[tuple[int, int], tuple[int, ...]]:
-    """(camera, pixel) -> codes, of all parts of a frame; none twice."""
-    rows = {}
+    """Of all parts of a frame; none twice."""
+    rows: dict[tuple[int, int], tuple[int, ...]] = {}
     for phase in range(parts):
         views, which = found.part(frame, phase, parts)
-        for ray in which:
-            key = (int(views.camera[ray]), int(views.pixel[ray]))
-            assert key not in rows
-            rows[key] = tuple(views.codes[ray].ravel().tolist())
+        own = rows_of(views.part(which))
+        assert len(own) == len(which) and not own.keys() & rows.keys()
+        rows.update(own)
     return rows
 
 
 @pytest.mark.parametrize("stride", [1, 5])
 def test_in_a_head_that_stands_still_all_shares_are_the_still_rays(scene: Scene, stride: int) -> None:
     found = rays(replace(scene, poses=STILL), stride)
-    still = trace_views(scene, layers(), stride)
-    expected = {
-        (int(c), int(p)): tuple(codes.ravel().tolist())
-        for c, p, codes in zip(still.camera, still.pixel, still.codes, strict=True)
-    }
+    expected = rows_of(trace_views(scene, layers(), stride))
     assert seen(found, 1, found.shares) == expected
     assert found.count == pytest.approx(len(expected), rel=0.01)
 
@@ -69,15 +70,13 @@ def test_finer_parts_are_the_same_rays(scene: Scene) -> None:
 def test_each_frame_has_the_rays_of_its_own_cameras(scene: Scene) -> None:
     turned = replace(scene, poses=TURNED)
     found = rays(turned)
-    first = scene.indices("train")[0]
     moved = replace(scene, cameras=tuple(turned.camera_in_head(i, 1) for i in range(len(scene.cameras))))
-    expected = trace_views(moved, layers(), 1)
-    own = expected.camera == 0
-    assert first == 0
-    rows = {pixel: codes for (camera, pixel), codes in seen(found, 1, found.shares).items() if camera == 0}
-    assert rows == {
-        int(p): tuple(codes.ravel().tolist()) for p, codes in zip(expected.pixel[own], expected.codes[own], strict=True)
-    }
+    assert scene.indices("train")[0] == 0
+    rows, expected = (
+        {pixel: codes for (camera, pixel), codes in rays.items() if camera == 0}
+        for rays in (seen(found, 1, found.shares), rows_of(trace_views(moved, layers(), 1)))
+    )
+    assert rows == expected
 
 
 def test_what_does_not_fit_is_traced_anew_and_is_the_same(scene: Scene) -> None:

@@ -91,8 +91,7 @@ def test_a_frame_that_leaps_is_refused_and_bridged() -> None:
 
 
 def test_a_frame_that_looks_like_nothing_is_refused() -> None:
-    poses = [Similarity.identity()] * 4
-    assert registration._refused(poses, np.array([1, 0.8, 0.2, 0.9]), 0) == [2]
+    assert registration._refused([Similarity.identity()] * 4, np.array([1, 0.8, 0.2, 0.9]), 0) == [2]
 
 
 @pytest.fixture
@@ -115,20 +114,14 @@ def test_when_poses_are_looked_for_and_kept(
     assert [one.kind for one in back.left_out] == (["head_turns"] if posed else [])
 
 
-@pytest.mark.parametrize("stabilize", ["auto", "found"])
-def test_pictures_that_tell_nothing_stop_only_who_asked(
-    scene: Scene, monkeypatch: pytest.MonkeyPatch, stabilize: str
-) -> None:
+def test_pictures_that_tell_nothing_stop_only_who_asked(scene: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
     def nothing(*_: object) -> Found:
         raise UserError("no subject was found in the images")
 
     monkeypatch.setattr(registration, "find_track", nothing)
-    params = NormalizeParams(stabilize=stabilize)  # type: ignore[arg-type]
-    if stabilize == "auto":
-        assert with_found_poses(scene, params) is scene
-    else:
-        with pytest.raises(UserError, match="no subject"):
-            with_found_poses(scene, params)
+    assert with_found_poses(scene, NormalizeParams(stabilize="auto")) is scene
+    with pytest.raises(UserError, match="no subject"):
+        with_found_poses(scene, NormalizeParams(stabilize="found"))
 
 
 def test_a_scene_that_has_poses_keeps_them(scene: Scene) -> None:

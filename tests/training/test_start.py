@@ -19,14 +19,11 @@ CENTRE = np.array(SPHERE_CENTRE)
 
 
 def test_levels_straddle_the_tracked_mesh_outermost_first(tmp_path: Path) -> None:
-    start = find_start(make_scene(tmp_path, size=8, surface_radius=0.33), MlpParams(layers=7))
+    scene = make_scene(tmp_path, size=8, surface_radius=0.33)
+    start = find_start(scene, MlpParams(layers=7))
     assert start.levels == pytest.approx(np.linspace(0.36, 0.30, 7), abs=1e-6)
     assert start.radius == pytest.approx(0.33 + 0.03 + MARGIN, abs=1e-6)
-
-
-def test_a_single_layer_lies_on_the_surface(tmp_path: Path) -> None:
-    start = find_start(make_scene(tmp_path, size=8, surface_radius=0.33), MlpParams(layers=1))
-    assert start.levels == pytest.approx([0.33], abs=1e-6)
+    assert find_start(scene, MlpParams(layers=1)).levels == pytest.approx([0.33], abs=1e-6)
 
 
 def test_without_a_mesh_a_ball_is_fitted_to_the_field_of_view(tmp_path: Path) -> None:
