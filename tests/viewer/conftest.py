@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from playwright.sync_api import Page, Route
+from playwright.sync_api import FloatRect, Page, Route
 
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.serving.server import serving
@@ -108,6 +108,16 @@ class Player:
         """What is shown: (H, W, 4) in [0, 1]."""
         return captured(self.page, camera)
 
+    def boxes(self, selector: str) -> list[FloatRect]:
+        """Where all that match lie, CSS pixels; every one of them can be seen."""
+        found = [one.bounding_box() for one in self.page.locator(selector).all()]
+        assert found and all(found), selector
+        return [box for box in found if box]
+
+    def box(self, selector: str) -> FloatRect:
+        (found,) = self.boxes(selector)
+        return found
+
 
 NewPlayer = Callable[..., Player]
 Show = Callable[..., Player]
@@ -124,19 +134,35 @@ def touching(player: Player) -> Callable[..., object]:
     return touch
 
 
-def page_of_yours(player: Player, body: str) -> None:
-    """Open a page with `body` and the module of the player, without any policy, from the player's own server."""
-    script = '<script type="module" src="facefolds-player.js"></script>'
+def page_of_yours(
+    player: Player,
+    body: str,
+    script: str = "facefolds-player.js",
+    style: str = 'style="margin:0"',
+    policy: str | None = None,
+) -> None:
+    """Open a page with `body` and a module, by default the player's, from the player's own server."""
+    module = f'<script type="module" src="{script}"></script>'
     head = '<!doctype html><meta name="viewport" content="width=device-width">'
-    html = f'{head}<link rel="icon" href="data:,">{script}<body style="margin:0">{body}</body>'
-    player.page.route("**/yours.html", lambda route: route.fulfill(body=html, content_type="text/html"))
+    html = f'{head}<link rel="icon" href="data:,">{module}<body {style}>{body}</body>'
+    given = {"body": html, "headers": {"Content-Type": "text/html"}}
+    if policy is not None:
+        given["headers"]["Content-Security-Policy"] = policy
+    player.page.route("**/yours.html", lambda route: route.fulfill(**given))
     player.page.goto(f"{player.address}yours.html")
 
 
-def element(new_player: NewPlayer, asset: Path, attributes: str = "", inner: str = "", **options: object) -> Player:
-    """A page of yours with an element that shows the asset at its full level."""
-    player = new_player({"asset": asset}, viewport={"width": 400, "height": 300}, **options)
-    style = "height: 300px"
+def element(
+    new_player: NewPlayer,
+    asset: Path,
+    attributes: str = "",
+    inner: str = "",
+    size: tuple[int, int] = (400, 300),
+    **options: object,
+) -> Player:
+    """A page of yours with an element, as large as the window, that shows the asset at its full level."""
+    player = new_player({"asset": asset}, viewport={"width": size[0], "height": size[1]}, **options)
+    style = f"height: {size[1]}px"
     page_of_yours(player, f'<facefolds-player src="asset/" style="{style}" {attributes}>{inner}</facefolds-player>')
     player.wait("e.level === 'full'")
     return player
@@ -189,11 +215,13 @@ def new_player(new_page: Callable[..., Page], serve: Callable[[dict[str, Path]],
 
 @pytest.fixture
 def show(new_player: NewPlayer, rich: Path) -> Show:
-    """The page with `rich` on it; takes what `Player.open` and `new_player` take."""
+    """The page with an asset on it, by default `rich`; takes what `Player.open` and `new_player` take."""
 
-    def shown(view: str = "frame=0", full: bool = False, **options: object) -> Player:
-        player = new_player({"asset": rich}, **options)
-        player.open("asset", view, full=full)
+    def shown(
+        view: str = "frame=0", full: bool = False, wait: bool = True, asset: Path = rich, **options: object
+    ) -> Player:
+        player = new_player({"asset": asset}, **options)
+        player.open("asset", view, wait, full)
         return player
 
     return shown

@@ -32,6 +32,13 @@ def file_entry(path: Path) -> dict[str, Any]:
     return {"file": path.name, "bytes": len(data), "sha256": hashlib.sha256(data).hexdigest()}
 
 
+def flipped(data: bytes, at: int) -> bytes:
+    """With one bit changed in the byte at that place."""
+    spoiled = bytearray(data)
+    spoiled[at] ^= 1
+    return bytes(spoiled)
+
+
 def change_manifest(folder: Path, change: Callable[[dict[str, Any]], None]) -> Manifest:
     """Edit the manifest of an asset as JSON, bring sizes up to date, validate and seal it again."""
     path = folder / "manifest.json"

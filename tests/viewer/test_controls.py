@@ -12,12 +12,9 @@ from tests.viewer.conftest import NewPlayer, Player, Show, page_of_yours, touchi
 
 
 @pytest.fixture
-def player(new_player: NewPlayer, rich: Path) -> Player:
-    player = new_player(
-        {"asset": rich}, viewport={"width": 760, "height": 500}, permissions=["clipboard-write", "clipboard-read"]
-    )
-    player.open("asset", full=True)
-    return player
+def player(show: Show) -> Player:
+    allowed = ["clipboard-write", "clipboard-read"]
+    return show(full=True, viewport={"width": 760, "height": 500}, permissions=allowed)
 
 
 def value(player: Player, expression: str) -> object:
@@ -30,7 +27,7 @@ def changes_picture(player: Player, act: object) -> bool:
     return bool(np.abs(player.capture() - before).max() > 0.02)
 
 
-def test_play_pause_and_step_buttons(player: Player) -> None:
+def test_buttons_and_sliders_of_the_bar(player: Player) -> None:
     player.button("Next frame")
     player.wait("e.frame === 1")
     player.button("Previous frame")
@@ -41,9 +38,6 @@ def test_play_pause_and_step_buttons(player: Player) -> None:
     assert value(player, "e.playing")
     player.button("Pause")
     assert not value(player, "e.playing")
-
-
-def test_scrubbing_and_speed_and_loop(player: Player) -> None:
     scrubber = player.page.get_by_role("slider", name="Frame")
     scrubber.fill("4")
     player.wait("e.frame === 4")
@@ -56,8 +50,7 @@ def test_scrubbing_and_speed_and_loop(player: Player) -> None:
 
 def test_scrubbing_while_playing_goes_on_playing(player: Player) -> None:
     player.run("e.speed = 0.1; e.play()")
-    box = player.page.get_by_role("slider", name="Frame").bounding_box()
-    assert box
+    box = player.box("role=slider[name='Frame']")
     player.page.mouse.move(box["x"] + 0.5 * box["width"], box["y"] + box["height"] / 2)
     player.page.mouse.down()
     player.wait("!e.playing")
@@ -67,8 +60,9 @@ def test_scrubbing_while_playing_goes_on_playing(player: Player) -> None:
 
 
 def test_keys(player: Player) -> None:
+    """In the full page they work before a click."""
     press = player.page.keyboard.press
-    player.page.locator("canvas").focus()
+    assert value(player, "document.activeElement === document.body")
     steps = [
         ("ArrowRight", "e.frame === 1"), ("ArrowLeft", "e.frame === 0"),
         ("End", "e.frame === 5"), ("Home", "e.frame === 0"),
@@ -80,12 +74,6 @@ def test_keys(player: Player) -> None:
     for key, condition in steps:
         press(key)
         player.wait(condition)
-
-
-def test_keys_work_in_the_full_page_before_a_click(player: Player) -> None:
-    assert value(player, "document.activeElement === document.body")
-    player.page.keyboard.press("ArrowRight")
-    player.wait("e.frame === 1")
 
 
 def test_focus_given_to_the_element_is_its_pictures(new_player: NewPlayer, rich: Path) -> None:
@@ -194,8 +182,7 @@ def test_comparison_with_held_out_photos(player: Player) -> None:
     page.get_by_label("Border between").fill("20")
     page.get_by_label("Photo", exact=True).select_option("1")
     player.wait("e.comparison.index === 1 && e.frame === 4")
-    stage, photo = page.locator("canvas").bounding_box(), page.locator(".compare img").bounding_box()
-    assert stage and photo
+    stage, photo = player.box("canvas"), player.box(".compare img")
     assert photo["width"] == pytest.approx(photo["height"])  # the photo is square
     assert photo["height"] == pytest.approx(min(stage["width"], stage["height"]), abs=1)
     player.button("Close the comparison")

@@ -4,29 +4,44 @@ from __future__ import annotations
 
 import base64
 import shutil
+from collections.abc import Callable
 from pathlib import Path
 from urllib.parse import urlsplit
 
 import numpy as np
 import pytest
 
-from tests.viewer.conftest import PATIENCE, NewPlayer, Player, Show, page_of_yours, touching
+from tests.viewer.conftest import NewPlayer, Player, Show, page_of_yours, touching
 
 COUNT_FRAMES = """window.frames_asked = 0; const ask = requestAnimationFrame.bind(window);
     window.requestAnimationFrame = (act) => { ++window.frames_asked; return ask(act); };"""
 TALL = '<div style="height:3000px"></div>'
 ONE = '<facefolds-player src="asset/" style="height:300px" {0}></facefolds-player>'
+SMALL = ONE.replace("height:300px", "width:24px; height:300px").format('controls="none"')
+
+
+ALL_READY = "[...document.querySelectorAll('facefolds-player')].every((e) => e.ready)"
 
 
 def names(player: Player) -> list[str]:
     return [Path(urlsplit(url).path).name for url in player.requests]
 
 
-def opened(new_player: NewPlayer, asset: Path, body: str, script: str = "", **options: object) -> Player:
-    player = new_player({"asset": asset}, script=script, **options)
-    page_of_yours(player, body)
-    player.page.locator("facefolds-player").first.wait_for(state="attached")
-    return player
+Opened = Callable[..., Player]
+
+
+@pytest.fixture
+def opened(new_player: NewPlayer, rich: Path) -> Opened:
+    """A page of yours with `rich`, where a condition on its (first) element holds."""
+
+    def of(body: str, until: str = "e.ready", **options: object) -> Player:
+        player = new_player({"asset": rich}, **options)
+        page_of_yours(player, body)
+        player.page.locator("facefolds-player").first.wait_for(state="attached")
+        player.wait(until)
+        return player
+
+    return of
 
 
 @pytest.mark.parametrize(
@@ -38,29 +53,17 @@ def opened(new_player: NewPlayer, asset: Path, body: str, script: str = "", **op
         ("var(--mine)", (1, 2, 3, 255)),
     ],
 )
-def test_any_colour_of_css_is_a_background(
-    new_player: NewPlayer, rich: Path, colour: str, seen: tuple[int, ...]
-) -> None:
-    body = f'<style>:root {{ --mine: rgb(1 2 3) }}</style>{ONE.format(f"""background="{colour}" """)}'
-    player = opened(new_player, rich, body)
-    player.wait("e.ready")
+def test_any_colour_of_css_is_a_background(opened: Opened, colour: str, seen: tuple[int, ...]) -> None:
+    """What is none is refused and changes nothing."""
+    player = opened(f'<style>:root {{ --mine: rgb(1 2 3) }}</style>{ONE.format(f"""background="{colour}" """)}')
     assert np.abs(player.capture()[0, 0] * 255 - seen).max() <= 1
+    refused = player.run("try { e.background = 'nonsense' } catch (error) { return [error.name, e.background] }")
+    assert refused == ["TypeError", colour]
 
 
-def test_what_is_no_colour_is_refused_and_changes_nothing(new_player: NewPlayer, rich: Path) -> None:
-    player = opened(new_player, rich, ONE.format('background="#ff0000"'))
-    player.wait("e.ready")
-    assert player.run("try { e.background = 'nonsense' } catch (error) { return [error.name, e.background] }") == [
-        "TypeError",
-        "#ff0000",
-    ]
-
-
-@pytest.mark.parametrize("when", ["before", "after"])
-def test_a_part_of_the_state_changes_that_part(new_player: NewPlayer, rich: Path, when: str) -> None:
-    player = opened(new_player, rich, ONE.format('controls="none"'))
-    if when == "after":
-        player.wait("e.ready")
+@pytest.mark.parametrize("until", ["true", "e.ready"])
+def test_a_part_of_the_state_changes_that_part(opened: Opened, until: str) -> None:
+    player = opened(ONE.format('controls="none"'), until)
     player.run("e.state = {view: {azimuth: 40}}; e.state = {view: {elevation: 5}}")
     player.wait("e.ready")
     view, home = player.run("return [e.state.view, e.player.view.home]")
@@ -69,9 +72,8 @@ def test_a_part_of_the_state_changes_that_part(new_player: NewPlayer, rich: Path
     assert player.run("try { e.state = {view: {azimuth: 'x'}} } catch (error) { return error.name }") == "TypeError"
 
 
-def test_the_wheel_scrolls_the_page_until_the_player_is_meant(new_player: NewPlayer, rich: Path) -> None:
-    player = opened(new_player, rich, ONE.format("") + TALL)
-    player.wait("e.ready")
+def test_the_wheel_scrolls_the_page_until_the_player_is_meant(opened: Opened) -> None:
+    player = opened(ONE.format("") + TALL)
     before = player.run("return e.player.view.goal.distance")
     mouse = player.page.mouse
     mouse.move(200, 100)
@@ -90,10 +92,9 @@ def test_the_wheel_scrolls_the_page_until_the_player_is_meant(new_player: NewPla
     assert player.page.evaluate("() => scrollY") == 0
 
 
-def test_one_finger_scrolls_the_page_upright_and_turns_across(new_player: NewPlayer, rich: Path) -> None:
+def test_one_finger_scrolls_the_page_upright_and_turns_across(opened: Opened) -> None:
     phone = {"viewport": {"width": 390, "height": 600}, "has_touch": True, "is_mobile": True}
-    player = opened(new_player, rich, ONE.format("") + TALL, **phone)
-    player.wait("e.ready")
+    player = opened(ONE.format("") + TALL, **phone)
     assert player.run("return getComputedStyle(e.shadowRoot.querySelector('canvas')).touchAction") == "pan-y"
     touch = touching(player)
     touch("touchStart", (200, 200))
@@ -112,11 +113,8 @@ def test_one_finger_scrolls_the_page_upright_and_turns_across(new_player: NewPla
     assert player.page.evaluate("() => scrollY") == 0
 
 
-def test_twenty_players_share_one_context_and_give_it_back(new_player: NewPlayer, rich: Path) -> None:
-    player = opened(new_player, rich, 20 * ONE.format('controls="none"'), viewport={"width": 400, "height": 6000})
-    player.page.wait_for_function(
-        "() => [...document.querySelectorAll('facefolds-player')].every((e) => e.ready)", timeout=PATIENCE
-    )
+def test_twenty_players_share_one_context_and_give_it_back(opened: Opened) -> None:
+    player = opened(20 * ONE.format('controls="none"'), ALL_READY, viewport={"width": 400, "height": 6000})
     all_of_them = "const all = [...document.querySelectorAll('facefolds-player')];"
     assert player.run(
         f"""{all_of_them} const count = new Set(all.map((e) => e.player.renderer.graphics.gl)).size;
@@ -130,20 +128,17 @@ def test_twenty_players_share_one_context_and_give_it_back(new_player: NewPlayer
     ) == [False, True]
 
 
-def test_nothing_moves_at_rest(new_player: NewPlayer, rich: Path) -> None:
-    player = opened(new_player, rich, ONE.format(""), COUNT_FRAMES)
-    player.wait("e.level === 'full'")
+def test_nothing_moves_at_rest(opened: Opened) -> None:
+    player = opened(ONE.format(""), "e.level === 'full'", script=COUNT_FRAMES)
     player.page.wait_for_timeout(300)
-    assert player.run(
-        "const n = frames_asked; await new Promise((done) => setTimeout(done, 500)); return frames_asked - n"
-    ) == (0)
+    rest = "const n = frames_asked; await new Promise((done) => setTimeout(done, 500)); return frames_asked - n"
+    assert player.run(rest) == 0
     player.run("e.play()")
     player.wait("frames_asked > 5")
 
 
-def test_off_the_screen_nothing_is_drawn_decoded_or_fetched(new_player: NewPlayer, rich: Path) -> None:
-    player = opened(new_player, rich, TALL + ONE.format(""), COUNT_FRAMES)
-    player.wait("e.ready")
+def test_off_the_screen_nothing_is_drawn_decoded_or_fetched(opened: Opened) -> None:
+    player = opened(TALL + ONE.format(""), script=COUNT_FRAMES)
     player.run("e.play()")
     player.page.wait_for_timeout(600)
     assert "coarse.mp4" in names(player)
@@ -159,17 +154,16 @@ def test_off_the_screen_nothing_is_drawn_decoded_or_fetched(new_player: NewPlaye
     assert player.run(rest) == [0, 0, True]
 
 
-def test_a_lazy_player_waits_until_it_is_near(new_player: NewPlayer, rich: Path) -> None:
-    player = opened(new_player, rich, TALL + ONE.format('loading="lazy"'))
+def test_a_lazy_player_waits_until_it_is_near(opened: Opened) -> None:
+    player = opened(TALL + ONE.format('loading="lazy"'), "true")
     player.page.wait_for_timeout(500)
     assert "manifest.json" not in names(player)
     player.page.evaluate("() => scrollTo(0, 3000)")
     player.wait("e.ready")
 
 
-def test_the_level_can_be_changed_at_any_time(new_player: NewPlayer, rich: Path) -> None:
-    player = opened(new_player, rich, ONE.format('level="coarse"'))
-    player.wait("e.ready")
+def test_the_level_can_be_changed_at_any_time(opened: Opened) -> None:
+    player = opened(ONE.format('level="coarse"'))
     assert player.run("return e.level") == "coarse"
     player.run("e.setAttribute('level', 'full')")
     player.wait("e.level === 'full'")
@@ -180,11 +174,9 @@ def test_the_level_can_be_changed_at_any_time(new_player: NewPlayer, rich: Path)
 
 
 @pytest.mark.parametrize("how", ["e.style.width = '300px'", "e.player.view.zoom(0.1)", "e.level = 'full'"])
-def test_a_small_canvas_needs_no_fine_level(new_player: NewPlayer, rich: Path, how: str) -> None:
+def test_a_small_canvas_needs_no_fine_level(opened: Opened, how: str) -> None:
     """In pixels of the device: a texel for a pixel is enough. A larger canvas, or a nearer view, needs more."""
-    small = ONE.replace("height:300px", "width:24px; height:300px").format('controls="none"')
-    player = opened(new_player, rich, small)
-    player.wait("e.ready")
+    player = opened(SMALL)
     player.page.wait_for_timeout(500)
     assert player.run("return [e.level, e.player.detail.auto]") == ["coarse", True]
     assert "full.mp4" not in names(player)
@@ -192,15 +184,12 @@ def test_a_small_canvas_needs_no_fine_level(new_player: NewPlayer, rich: Path, h
     player.wait("e.level === 'full'")
 
 
-def test_a_dense_screen_needs_a_fine_level(new_player: NewPlayer, rich: Path) -> None:
-    small = ONE.replace("height:300px", "width:24px; height:300px").format('controls="none"')
-    player = opened(new_player, rich, small, device_scale_factor=2)
-    player.wait("e.level === 'full'")
+def test_a_dense_screen_needs_a_fine_level(opened: Opened) -> None:
+    opened(SMALL, "e.level === 'full'", device_scale_factor=2)
 
 
-def test_what_it_shows_is_kept_when_it_is_moved(new_player: NewPlayer, rich: Path) -> None:
-    player = opened(new_player, rich, ONE.format("") + '<div id="other"></div>')
-    player.wait("e.level === 'full'")
+def test_what_it_shows_is_kept_when_it_is_moved(opened: Opened) -> None:
+    player = opened(ONE.format("") + '<div id="other"></div>', "e.level === 'full'")
     player.run("e.spread = 0.5; await e.seek(3); e.player.view.set({azimuth: 30, elevation: 5, distance: 2, "
                "target: [0, 0, 0]})")  # fmt: skip
     count = len(names(player))
@@ -214,9 +203,8 @@ def test_what_it_shows_is_kept_when_it_is_moved(new_player: NewPlayer, rich: Pat
     assert player.run("return e.spread") == 0.5
 
 
-def test_auto_steps_down_where_pictures_are_late_and_up_again(new_player: NewPlayer, rich: Path) -> None:
-    player = opened(new_player, rich, ONE.format(""))
-    player.wait("e.level === 'full'")
+def test_auto_steps_down_where_pictures_are_late_and_up_again(opened: Opened) -> None:
+    player = opened(ONE.format(""), "e.level === 'full'")
     player.run(
         """window.slow = true; e.addEventListener('frame', () => {
           for (const end = performance.now() + 120; slow && e.level === 'full' && performance.now() < end;); });
@@ -227,11 +215,10 @@ def test_auto_steps_down_where_pictures_are_late_and_up_again(new_player: NewPla
     player.wait("e.level === 'full'")
 
 
-def test_many_sizes_do_not_disturb_each_other(new_player: NewPlayer, rich: Path) -> None:
+def test_many_sizes_do_not_disturb_each_other(opened: Opened) -> None:
     """The shared canvas is as large as the largest: a small player copies its own part."""
     small = '<facefolds-player src="asset/" controls="none" style="width:120px; height:150px"></facefolds-player>'
-    player = opened(new_player, rich, small + ONE.format('controls="none"'))
-    player.page.wait_for_function("() => [...document.querySelectorAll('facefolds-player')].every((e) => e.ready)")
+    player = opened(small + ONE.format('controls="none"'), ALL_READY)
     difference = player.run(
         """e.pause(); await e.seek(2); const { canvas } = e.player; const seen = e.capture().data;
         const there = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height).data;

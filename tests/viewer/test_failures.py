@@ -15,8 +15,8 @@ from playwright.sync_api import Page
 
 from tests.assets import make_asset
 from tests.older import make_older
-from tests.viewer.conftest import NewPlayer, page_of_yours
-from tests.viewer.fixtures import change_manifest, file_entry
+from tests.viewer.conftest import NewPlayer, Show, page_of_yours
+from tests.viewer.fixtures import change_manifest, file_entry, flipped
 
 NOT_FOUND = "Failed to load resource"  # the browser's own line about an answer of 404
 GONE = "net::ERR_"
@@ -39,24 +39,22 @@ NO_WEBGL = """const get = HTMLCanvasElement.prototype.getContext;
           return kind === 'webgl2' ? null : get.call(this, kind, ...rest); };"""
 
 
-def test_without_webgl2(new_player: NewPlayer, asset: Path) -> None:
+def test_without_webgl2(show: Show) -> None:
     """The poster stands in, above the words."""
-    player = new_player({"asset": asset}, script=NO_WEBGL)
-    player.open("asset", wait=False)
+    player = show(wait=False, script=NO_WEBGL)
     text = player.message()
     assert "no WebGL 2" in text
     assert "hardware acceleration" in text
-    poster = player.page.get_by_role("img", name="The subject, from the front")
-    poster.wait_for()
-    shown, words = poster.bounding_box(), player.page.locator(".message > div").bounding_box()
-    assert shown and words and shown["height"] > 200 and words["y"] >= shown["y"] + shown["height"]
+    player.page.get_by_role("img", name="The subject, from the front").wait_for()
+    shown, words = player.box(".poster"), player.box(".message > div")
+    assert shown["height"] > 200 and words["y"] >= shown["y"] + shown["height"]
     red = player.run("const image = e.shadowRoot.querySelector('.poster'); return [image.naturalWidth, image.complete]")
     assert red == [90, True]
 
 
 @pytest.mark.parametrize("script", ["", NO_WEBGL], ids=["loading", "no WebGL"])
-def test_a_poster_of_the_pages_own(new_player: NewPlayer, asset: Path, script: str) -> None:
-    player = new_player({"asset": asset}, script=script)
+def test_a_poster_of_the_pages_own(new_player: NewPlayer, rich: Path, script: str) -> None:
+    player = new_player({"asset": rich}, script=script)
     release = player.hold("**/*.mp4")
     page_of_yours(
         player,
@@ -74,19 +72,18 @@ def test_a_poster_of_the_pages_own(new_player: NewPlayer, asset: Path, script: s
     player.wait("e.shadowRoot.querySelector('.poster').matches('.gone')")
 
 
-def test_no_asset_at_the_address(new_player: NewPlayer, asset: Path) -> None:
-    player = new_player({"asset": asset}, allow=(NOT_FOUND,))
+def test_no_asset_at_the_address(new_player: NewPlayer, rich: Path) -> None:
+    player = new_player({"asset": rich}, allow=(NOT_FOUND,))
     player.open("nowhere", wait=False)
     assert "manifest.json is missing" in player.message()
     assert not player.page.locator(".bar").is_visible()
 
 
 @pytest.mark.parametrize("version", [1, 2])
-def test_an_asset_of_an_older_version_plays(new_player: NewPlayer, tmp_path: Path, version: int) -> None:
+def test_an_asset_of_an_older_version_plays(show: Show, tmp_path: Path, version: int) -> None:
     make_asset(tmp_path / "asset", layers=2, frames=4)
     make_older(tmp_path / "asset", version)
-    player = new_player({"asset": tmp_path / "asset"})
-    player.open("asset")
+    player = show(asset=tmp_path / "asset")
     assert player.run("return [await e.seek(3), e.frame, e.fps, e.statistics.layers]") == [True, 3, 30, 2]
 
 
@@ -99,13 +96,9 @@ def test_an_asset_of_an_older_version_plays(new_player: NewPlayer, tmp_path: Pat
         ('{"format": "facefolds", "version": 5, "minVersion": 5}', "too old"),
     ],
 )
-def test_a_manifest_that_is_garbled_or_of_a_newer_format(
-    new_player: NewPlayer, asset: Path, text: str, said: str
-) -> None:
+def test_a_manifest_that_is_garbled_or_of_a_newer_format(show: Show, asset: Path, text: str, said: str) -> None:
     (asset / "manifest.json").write_text(text)
-    player = new_player({"asset": asset})
-    player.open("asset", wait=False)
-    assert said in player.message()
+    assert said in show(asset=asset, wait=False).message()
 
 
 def spoil_missing(asset: Path) -> str:
@@ -121,9 +114,7 @@ def spoil_short(asset: Path) -> str:
 
 def spoil_changed(asset: Path) -> str:
     path = asset / "coarse_meshes.bin"
-    data = bytearray(path.read_bytes())
-    data[200] ^= 1
-    path.write_bytes(data)
+    path.write_bytes(flipped(path.read_bytes(), 200))
     return "content was changed"
 
 
@@ -156,22 +147,18 @@ def spoil_codec(asset: Path) -> str:
     ],
     ids=lambda f: f.__name__[6:],
 )
-def test_a_file_that_is_missing_or_damaged(new_player: NewPlayer, one_level: Path, spoil: object) -> None:
+def test_a_file_that_is_missing_or_damaged(show: Show, one_level: Path, spoil: Callable[[Path], str]) -> None:
     said = spoil(one_level)
-    player = new_player({"asset": one_level}, allow=(NOT_FOUND,))
-    player.open("asset", wait=False)
-    text = player.message()
+    text = show(asset=one_level, wait=False, allow=(NOT_FOUND,)).message()
     assert said in text
     assert "Try again" in text
 
 
-def test_try_again_loads_again(new_player: NewPlayer, one_level: Path, tmp_path: Path) -> None:
-    asset = one_level
-    (asset / "coarse.mp4").rename(tmp_path / "away")
-    player = new_player({"asset": asset}, allow=(NOT_FOUND,))
-    player.open("asset", wait=False)
+def test_try_again_loads_again(show: Show, one_level: Path, tmp_path: Path) -> None:
+    (one_level / "coarse.mp4").rename(tmp_path / "away")
+    player = show(asset=one_level, wait=False, allow=(NOT_FOUND,))
     player.message()
-    (tmp_path / "away").rename(asset / "coarse.mp4")
+    (tmp_path / "away").rename(one_level / "coarse.mp4")
     player.button("Try again")
     player.wait("e.ready")
     assert not player.page.get_by_role("alert").is_visible()
@@ -185,12 +172,9 @@ def test_try_again_loads_again(new_player: NewPlayer, one_level: Path, tmp_path:
         ("full", "coarse", "level=full&frame=0"),  # though it was asked for
     ],
 )
-def test_a_damaged_level_gives_way_to_the_other(
-    new_player: NewPlayer, asset: Path, damaged: str, left: str, view: str
-) -> None:
+def test_a_damaged_level_gives_way_to_the_other(show: Show, asset: Path, damaged: str, left: str, view: str) -> None:
     (asset / f"{damaged}_meshes.bin").unlink()
-    player = new_player({"asset": asset}, allow=(NOT_FOUND,))
-    player.open("asset", view)
+    player = show(view, asset=asset, allow=(NOT_FOUND,))
     assert f"{damaged}_meshes.bin is missing" in player.notice()
     assert player.run("e.play(); return [e.level, e.playing]") == [left, True]
 
@@ -212,12 +196,12 @@ def plain_server(folder: Path) -> Iterator[str]:
 
 
 def test_another_server_that_does_not_allow_it(
-    new_player: NewPlayer, asset: Path, player_folder: Path, tmp_path: Path
+    new_player: NewPlayer, rich: Path, player_folder: Path, tmp_path: Path
 ) -> None:
     """CORS, and a policy of the page, are told apart from a server that is gone."""
     site = Path(shutil.copytree(player_folder, tmp_path / "site"))
-    player = new_player({"asset": asset}, allow=("CORS", GONE, "Content Security Policy", "Content-Security-Policy"))
-    with plain_server(asset) as other, plain_server(site) as mine:
+    player = new_player({"asset": rich}, allow=("CORS", GONE, "Content Security Policy", "Content-Security-Policy"))
+    with plain_server(rich) as other, plain_server(site) as mine:
         (site / "yours.html").write_text(
             '<!doctype html><link rel="icon" href="data:,"><script type="module" src="facefolds-player.js"></script>'
             f'<facefolds-player src="{other}"></facefolds-player>'
@@ -234,9 +218,8 @@ def test_the_page_opened_as_a_file_says_what_to_do(new_page: Callable[..., Page]
     assert "facefolds export-html" in page.locator("#words").inner_text()
 
 
-def test_it_goes_on_by_itself_when_the_connection_is_back(new_player: NewPlayer, asset: Path) -> None:
-    player = new_player({"asset": asset}, allow=(NOT_FOUND, GONE))
-    player.open("asset")
+def test_it_goes_on_by_itself_when_the_connection_is_back(show: Show) -> None:
+    player = show(allow=(NOT_FOUND, GONE))
     player.page.context.set_offline(True)
     player.run("e.setAttribute('src', '/asset/?again')")
     assert "cannot be reached" in player.message()
@@ -246,22 +229,18 @@ def test_it_goes_on_by_itself_when_the_connection_is_back(new_player: NewPlayer,
     assert not player.page.get_by_role("alert").is_visible()
 
 
-def test_a_broken_stream_falls_back_to_the_second_video(new_player: NewPlayer, asset: Path) -> None:
+def test_a_broken_stream_falls_back_to_the_second_video(show: Show, asset: Path) -> None:
     """The MP4's coded pictures are garbage: the decoder gives up, the WebM of the same level is taken."""
     path = asset / "full.mp4"
-    data = bytearray(path.read_bytes())
+    data = path.read_bytes()
     start = data.index(b"mdat") + 4
-    data[start:] = bytes(len(data) - start)
-    path.write_bytes(data)
+    path.write_bytes(data[:start] + bytes(len(data) - start))
     change_manifest(asset, lambda value: value["levels"][1]["texture"]["videos"][0].update(file_entry(path)))
-    player = new_player({"asset": asset})
-    player.open("asset", full=True)
-    assert player.run("return e.statistics.video") == "vp9"
+    assert show(asset=asset, full=True).run("return e.statistics.video") == "vp9"
 
 
-def test_a_lost_context_is_said_and_comes_back(new_player: NewPlayer, asset: Path) -> None:
-    player = new_player({"asset": asset}, allow=())
-    player.open("asset", full=True)
+def test_a_lost_context_is_said_and_comes_back(show: Show) -> None:
+    player = show(full=True)
     before = player.capture()
     player.run(
         """const { gl } = e.player.renderer.graphics;
@@ -273,15 +252,14 @@ def test_a_lost_context_is_said_and_comes_back(new_player: NewPlayer, asset: Pat
     assert abs(player.capture() - before).max() == 0
 
 
-def test_a_server_that_is_gone(new_player: NewPlayer, asset: Path) -> None:
-    player = new_player({"asset": asset}, allow=(NOT_FOUND, GONE))
+def test_a_server_that_is_gone(new_player: NewPlayer, rich: Path) -> None:
+    player = new_player({"asset": rich}, allow=(NOT_FOUND, GONE))
     player.page.route("**/coarse.mp4", lambda route: route.abort())
     player.open("asset", wait=False)
     assert "server cannot be reached" in player.message()
 
 
-def test_no_source(new_player: NewPlayer, asset: Path) -> None:
-    player = new_player({"asset": asset})
-    player.open("asset")
+def test_no_source(show: Show) -> None:
+    player = show()
     player.run("e.removeAttribute('src')")
     assert "No asset was named" in player.message()

@@ -19,7 +19,7 @@ from facefolds_core.rendering.raster import cast_layers
 from facefolds_core.rendering.reference import seen_from
 from tests.assets import MOVING, OVER_TORSO, make_asset
 from tests.pictures import GREY, GREY_VALUE, expected_means, expected_pictures, five_cameras, psnr
-from tests.viewer.conftest import NO_WEBCODECS, NewPlayer
+from tests.viewer.conftest import NO_WEBCODECS, Player, Show
 from tests.viewer.fixtures import moving_asset, shining
 
 SIZE = 160
@@ -33,106 +33,101 @@ def caps(tmp_path_factory: pytest.TempPathFactory) -> Asset:
     return make_asset(tmp_path_factory.mktemp("caps") / "asset", layers=5, frames=6, resolution=96)
 
 
-def check(new_player: NewPlayer, asset: Asset, size: int = SIZE, script: str = "") -> None:
-    """Five cameras, first, middle and last frame."""
-    player = new_player({"asset": asset.folder}, script=script)
-    player.open("asset")
-    player.run("e.background = v; e.effects = false", GREY)
-    cameras, frames = five_cameras(size), (0, asset.num_frames // 2, asset.num_frames - 1)
-    expected = expected_means(asset, cameras, frames)
+def on_grey(show: Show, asset: Asset, frame: int = 0, **options: object) -> Player:
+    player = show(asset=asset.folder, **options)
+    assert player.run("e.background = v[0]; return await e.seek(v[1])", [GREY, frame])
+    return player
+
+
+def agrees(player: Player, camera: Camera, expected: NDArray[np.float32]) -> bool:
+    return psnr(player.capture(camera)[..., :3], expected) >= AGREE
+
+
+def of_pixel_means(asset: Asset, camera: Camera, frame: int = 0) -> NDArray[np.float32]:
+    return expected_means(asset, [camera], [frame])[camera.name, frame]
+
+
+@pytest.mark.parametrize(
+    ("size", "script"), [(SIZE, ""), (SIZE, NO_WEBCODECS), pytest.param(96, "", marks=pytest.mark.nightly)]
+)
+def test_five_cameras_and_three_frames_agree_with_the_reference(
+    show: Show, caps: Asset, size: int, script: str
+) -> None:
+    """Also without WebCodecs: older browsers, and pages without HTTPS."""
+    player = on_grey(show, caps, script=script)
+    player.run("e.effects = false")
+    cameras, frames = five_cameras(size), (0, caps.num_frames // 2, caps.num_frames - 1)
+    expected = expected_means(caps, cameras, frames)
     for frame in frames:
         assert player.run("return await e.seek(v)", frame)
         for camera in cameras:
-            found = player.capture(camera)[..., :3]
-            assert psnr(found, expected[camera.name, frame]) >= AGREE, (camera.name, frame)
+            assert agrees(player, camera, expected[camera.name, frame]), (camera.name, frame)
 
 
-@pytest.mark.parametrize("size", [SIZE, pytest.param(96, marks=pytest.mark.nightly)])
-def test_five_cameras_and_three_frames_agree_with_the_reference(new_player: NewPlayer, caps: Asset, size: int) -> None:
-    check(new_player, caps, size)
-
-
-def test_the_video_element_shows_the_same(new_player: NewPlayer, caps: Asset) -> None:
-    """Without WebCodecs: older browsers, and pages without HTTPS."""
-    check(new_player, caps, script=NO_WEBCODECS)
-
-
-def test_where_pictures_come_late_what_moves_has_one_ray_a_pixel(new_player: NewPlayer, caps: Asset) -> None:
+def test_where_pictures_come_late_what_moves_has_one_ray_a_pixel(show: Show, caps: Asset) -> None:
     """At rest and in captures a pixel is always a mean."""
-    player = new_player({"asset": caps.folder})
-    player.open("asset")
+    player = on_grey(show, caps)
     player.wait("e.statistics.rays === 4")
     player.run("e.player.hurry(); e.play()")
     player.wait("e.statistics.rays === 1")
     player.run("e.pause()")
     player.wait("e.statistics.rays === 4")
-    player.run("e.background = v; await e.seek(0)", GREY)
+    player.run("await e.seek(0)")
     camera = five_cameras(96)[4]
-    assert psnr(player.capture(camera)[..., :3], expected_means(caps, [camera], [0])[camera.name, 0]) >= AGREE
+    assert agrees(player, camera, of_pixel_means(caps, camera))
 
 
-def test_a_machine_that_cannot_draw_it_finer_has_one_ray_a_pixel(new_player: NewPlayer, caps: Asset) -> None:
+def test_a_machine_that_cannot_draw_it_finer_has_one_ray_a_pixel(show: Show, caps: Asset) -> None:
     script = """const own = WebGL2RenderingContext.prototype.getParameter;
         WebGL2RenderingContext.prototype.getParameter = function (name) {
             return name === this.MAX_RENDERBUFFER_SIZE ? 180 : own.call(this, name); };"""
-    player = new_player({"asset": caps.folder}, script=script)
-    player.open("asset")
-    player.run("e.background = v; await e.seek(0)", GREY)
+    player = on_grey(show, caps, script=script)
     assert player.run("return e.statistics.rays") == 1
     for size, expected in ((96, expected_pictures), (90, expected_means)):
         camera = five_cameras(size)[4]
-        assert psnr(player.capture(camera)[..., :3], expected(caps, [camera], [0])[camera.name, 0]) >= AGREE
+        assert agrees(player, camera, expected(caps, [camera], [0])[camera.name, 0])
 
 
-def test_the_canvas_shows_what_is_captured(new_player: NewPlayer, caps: Asset) -> None:
-    player = new_player({"asset": caps.folder})
-    player.open("asset", "view=30,10,0.9,0,0,0&frame=3")
-    player.run("e.setAttribute('controls', 'none'); e.background = v", GREY)
+def test_the_canvas_shows_what_is_captured(show: Show, caps: Asset) -> None:
+    player = on_grey(show, caps, 3, view="view=30,10,0.9,0,0,0&frame=3")
+    player.run("e.setAttribute('controls', 'none')")
     player.page.wait_for_timeout(300)
     box = player.page.locator("canvas").screenshot(path=None, animations="disabled")
     shown = np.asarray(Image.open(io.BytesIO(box)).convert("RGB")) / 255
     assert psnr(shown, player.capture()[..., :3]) >= 50
 
 
-def test_a_transparent_background_stays_transparent(new_player: NewPlayer, caps: Asset) -> None:
-    player = new_player({"asset": caps.folder})
-    player.open("asset")
+def test_a_transparent_background_stays_transparent(show: Show, caps: Asset) -> None:
+    player, camera = show(asset=caps.folder), five_cameras(SIZE)[0]
     player.run("e.background = 'transparent'")
-    camera = five_cameras(SIZE)[0]
-    found = player.capture(camera)
     rgb, alpha = render(caps, camera, 0)
-    assert psnr(found[..., 3], alpha) >= AGREE
-    assert psnr(found[..., :3], rgb) >= AGREE  # premultiplied: the composite over black
+    assert psnr(player.capture(camera)[..., 3], alpha) >= AGREE
+    assert agrees(player, camera, rgb)  # premultiplied: the composite over black
 
 
-def test_reflections_follow_the_format(new_player: NewPlayer, caps: Asset, tmp_path: Path) -> None:
-    asset = shining(caps, tmp_path / "asset")
-    player = new_player({"asset": asset.folder})
-    player.open("asset")
-    player.run("e.background = v", GREY)
-    camera = five_cameras(SIZE)[1]
+def test_reflections_follow_the_format(show: Show, caps: Asset, tmp_path: Path) -> None:
+    asset, camera = shining(caps, tmp_path / "asset"), five_cameras(SIZE)[1]
+    player = on_grey(show, asset)
     expected, _ = render(asset, camera, 0, (GREY_VALUE,) * 3)
-    assert psnr(player.capture(camera)[..., :3], expected) >= AGREE
+    assert agrees(player, camera, expected)
     player.run("e.effects = false")
-    plain = expected_means(asset, [camera], [0])[camera.name, 0]
-    assert psnr(player.capture(camera)[..., :3], plain) >= AGREE
+    plain = of_pixel_means(asset, camera)
+    assert agrees(player, camera, plain)
     assert psnr(plain, expected) < 25  # the reflection is strong enough to be seen in this test
 
 
-def test_exposure_is_a_factor_of_the_light(new_player: NewPlayer, caps: Asset) -> None:
+def test_exposure_is_a_factor_of_the_light(show: Show, caps: Asset) -> None:
     """Of each layer's, not of the background; stored values are sRGB's."""
-    player = new_player({"asset": caps.folder})
-    player.open("asset")
-    player.run("e.background = v; e.exposure = 1.5", GREY)
-    camera = five_cameras(SIZE)[1]
+    player, camera = on_grey(show, caps), five_cameras(SIZE)[1]
+    player.run("e.exposure = 1.5")
     view = AreaView.of_hits(camera, lambda part: (cast_layers(part, caps.layers), None))
     brighter = [exposed(np.asarray(texture), 1.5) for texture in caps.frame(0)]
     expected, _ = view.composite(brighter, (GREY_VALUE,) * 3)
     plain, _ = view.composite(caps.frame(0), (GREY_VALUE,) * 3)
-    assert psnr(player.capture(camera)[..., :3], expected) >= AGREE
+    assert agrees(player, camera, expected)
     assert psnr(plain, expected) < 30  # it is strong enough to be seen in this test
     player.run("e.removeAttribute('exposure')")
-    assert psnr(player.capture(camera)[..., :3], plain) >= AGREE
+    assert agrees(player, camera, plain)
 
 
 def exposed(rgba: NDArray[np.generic], factor: float) -> NDArray[np.float32]:
@@ -145,34 +140,27 @@ def exposed(rgba: NDArray[np.generic], factor: float) -> NDArray[np.float32]:
 
 
 @pytest.mark.parametrize("source", [MOVING, OVER_TORSO], ids=["whole", "over a torso"])
-def test_a_head_that_moves_stands_where_it_stood(source: AssetSource, new_player: NewPlayer, tmp_path: Path) -> None:
+def test_a_head_that_moves_stands_where_it_stood(source: AssetSource, show: Show, tmp_path: Path) -> None:
     asset = make_asset(tmp_path / "asset", layers=3, frames=3, resolution=64, source=source)
-    player = new_player({"asset": asset.folder})
-    player.open("asset")
-    player.run("e.background = v; e.effects = false", GREY)
-    assert player.run("return await e.seek(v)", 2)
-    camera = five_cameras(SIZE)[1]
+    player, camera = on_grey(show, asset, 2), five_cameras(SIZE)[1]
     moved, _ = render(asset, camera, 2, (GREY_VALUE,) * 3)
-    at_rest = expected_means(asset, [camera], [2])[camera.name, 2]
-    assert psnr(player.capture(camera)[..., :3], moved) >= AGREE
+    at_rest = of_pixel_means(asset, camera, 2)
+    assert agrees(player, camera, moved)
     player.run("e.still = true")
-    assert psnr(player.capture(camera)[..., :3], at_rest) >= AGREE
+    assert agrees(player, camera, at_rest)
     assert psnr(moved, at_rest) < 25  # the motion is large enough to be seen in this test
 
 
-def test_the_light_stays_with_the_room_where_the_head_turns(new_player: NewPlayer, tmp_path: Path) -> None:
+def test_the_light_stays_with_the_room_where_the_head_turns(show: Show, tmp_path: Path) -> None:
     """Also where the head is held still: the room turns around it."""
     asset, camera = moving_asset(tmp_path / "asset", layers=3, resolution=64), five_cameras(SIZE)[1]
     assert asset.reflection() is not None and asset.track is not None
-    player = new_player({"asset": asset.folder})
-    player.open("asset")
-    player.run("e.background = v", GREY)
-    assert player.run("return await e.seek(v)", 2)
+    player = on_grey(show, asset, 2)
     for still in (False, True):
         player.run("e.still = v", still)
         seen_by = camera if still else seen_from(asset, camera, 2)
         expected, along = (shown(asset, seen_by, frame) for frame in (2, 0))
-        assert psnr(player.capture(camera)[..., :3], expected) >= AGREE, still
+        assert agrees(player, camera, expected), still
         assert psnr(along, expected) < 36  # light that turns with the head is another picture
 
 

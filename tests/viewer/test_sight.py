@@ -41,8 +41,7 @@ NEIGHBOURS = (("#16181d", DARK), ("#ffffff", WHITE), ("transparent", WHITE))
 
 @pytest.fixture
 def player(show: Show) -> Player:
-    player = show(full=True, viewport={"width": 900, "height": 700})
-    return player
+    return show(full=True, viewport={"width": 900, "height": 700})
 
 
 @pytest.mark.parametrize(
@@ -86,8 +85,7 @@ def test_the_controls_have_the_colours_of_what_is_behind(
     player.wait("e.ready")
     words = "return getComputedStyle(e.shadowRoot.querySelector('.title')).color.match(/\\d+/g).map(Number)"
     assert (max(player.run(words)) < 100) is light
-    bar = player.page.locator(".bar").bounding_box()
-    assert bar and 300 - bar["y"] < 45  # of 300 pixels
+    assert 300 - player.box(".bar")["y"] < 45  # of 300 pixels
     track = "return getComputedStyle(e.shadowRoot.querySelector('[data-do=settings]')).accentColor"
     assert player.run(track) == "rgb(1, 2, 3)"
     player.run("document.documentElement.style.colorScheme = 'light dark'")
