@@ -22,9 +22,7 @@ def brighter_by(amount: float) -> Look:
 def test_scores_are_over_any_background_and_of_the_worst_patch() -> None:
     assert scores(brighter_by(51 / 255), SCENE, TRUTH) == ["14.0", "14.0"]
     assert scores(brighter_by(5 / 255), SCENE, TRUTH) == ["34.2", "34.2"]
-
-
-def test_a_hole_costs_over_every_background() -> None:
+    # A hole costs over every background.
     hole: Look = lambda camera, frame: (np.zeros((SIDE, SIDE, 3)), np.zeros((SIDE, SIDE)))  # noqa: E731
     expected = np.mean([(value - 0.4) ** 2 for value in (0.0, 1.0, 0.5, 0.0)])
     assert scores(hole, SCENE, TRUTH)[0] == f"{-10 * np.log10(expected):.1f}"

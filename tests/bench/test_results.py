@@ -25,12 +25,8 @@ def measurement(iterations: int, seconds: float, psnr: float | None = None, **va
 def test_a_measurement_replaces_the_same_one_only(tmp_path: Path) -> None:
     store = Store(tmp_path / "new" / "results.json", "measurements", Measurement)
     other = CONDITIONS.model_copy(update={"commit": "bbb"})
-    for one in (
-        measurement(5, 10.4),
-        measurement(7, 30.1),
-        measurement(5, 9.0, conditions=other),
-        measurement(5, 10.2),
-    ):
+    first, elsewhere = [measurement(5, 10.4), measurement(7, 30.1)], measurement(5, 9.0, conditions=other)
+    for one in (*first, elsewhere, measurement(5, 10.2)):
         store.add(one)
     assert [m.seconds for m in store.read()] == [30.1, 9.0, 10.2]
 
@@ -50,15 +46,9 @@ def test_a_folder_outside_git_has_no_commit(tmp_path: Path) -> None:
 
 def test_the_newest_of_each_is_drawn_on_one_clock() -> None:
     processor = CONDITIONS.model_copy(update={"clock": "processor"})
-    found = charts.newest(
-        [
-            measurement(100, 10, 20.0, budget=10),
-            measurement(120, 11, 22.0, budget=10, date="2026-01-02"),
-            measurement(300, 30, 21.0),
-            measurement(40, 10, 17.0, conditions=processor),
-            measurement(60, 9, None, failure="diverged"),
-        ]
-    )
+    first, later = measurement(100, 10, 20.0, budget=10), measurement(120, 11, 22.0, budget=10, date="2026-01-02")
+    others = measurement(40, 10, 17.0, conditions=processor), measurement(60, 9, None, failure="diverged")
+    found = charts.newest([first, later, measurement(300, 30, 21.0), *others])
     assert [(m.seconds, m.scores.psnr) for m in found if m.scores] == [(11, 22.0), (30, 21.0)]
 
 

@@ -17,30 +17,22 @@ from tests.scoring.fakes import FRAMES, SPEC, flat_scene, half_mask, tiny_model
 
 def test_a_subject_stands_alone_with_its_changes(tmp_path: Path) -> None:
     path = tmp_path / "params.yaml"
-    subjects = {
-        "a": {"source": "multiface", "path": "../film", "train": {"layers": 4}},
-        "b": {"source": "actor", "path": "x"},
-    }
+    own = {"source": "multiface", "path": "../film", "train": {"layers": 4}}
+    subjects = {"a": own, "b": {"source": "actor", "path": "x"}}
     path.write_text(yaml.safe_dump({"subjects": subjects, "train": {"preset": "fast"}}))
     found = own_params("a", {"train": {"seed": 3}}, path)
-    assert found["train"] == {"preset": "fast"}
-    assert found["subjects"] == {
-        "a": {"source": "multiface", "path": str(tmp_path.parent / "film"), "train": {"layers": 4, "seed": 3}}
-    }
+    changed = {**own, "path": str(tmp_path.parent / "film"), "train": {"layers": 4, "seed": 3}}
+    assert found["train"] == {"preset": "fast"} and found["subjects"] == {"a": changed}
     assert own_params("b", {}, path)["subjects"]["b"]["path"] == "x"  # in the copy of the project
     with pytest.raises(UserError, match="no such subject"):
         own_params("c", {}, path)
 
 
-def test_a_stage_runs_on_the_projects_parameters(tmp_path: Path) -> None:
+def test_a_stage_runs_on_the_projects_parameters_and_says_how_it_failed(tmp_path: Path) -> None:
     project = Project(tmp_path, "actor")
     project.write(own_params("actor", {"train": {"layers": 3}}))
     project.run("configure")
     assert yaml.safe_load((project.folders.config / "train.json").read_text())["layers"] == 3
-
-
-def test_a_failed_stage_says_what_it_said(tmp_path: Path) -> None:
-    project = Project(tmp_path, "actor")
     project.write(own_params("actor", {"train": {"layers": -3}}))
     with pytest.raises(UserError, match="a parameter is wrong") as caught:
         project.run("configure")

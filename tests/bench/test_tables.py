@@ -95,9 +95,8 @@ def test_failures_and_what_went_astray() -> None:
 def test_a_subject_with_its_whole_budget_has_a_table_of_its_own() -> None:
     given = {"subject": "mugsy", "flat": 0.0}
     text = hazard_tables([cell("clean", 0, 25, **given), cell("gloss", 4, 22, **given), cell("clean", 0, 20)])
-    assert text.index("`fast`: clean 20.00") < text.index(
-        "`fast` on `mugsy`, its whole budget: clean 25.00 dB (seeds 25.00)"
-    )
+    own = "`fast` on `mugsy`, its whole budget: clean 25.00 dB (seeds 25.00)"
+    assert text.index("`fast`: clean 20.00") < text.index(own)
     assert "| glossy skin | x 4 | 3.00 |" in text
 
 

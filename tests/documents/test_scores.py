@@ -21,12 +21,10 @@ def test_the_readme_has_a_row_a_subject(tmp_path: Path) -> None:
     sizes = {"triangles": 90702, "mesh_bytes": 219_000, "texture_bytes": 260_000, "reflection_bytes": 15_000}
     cost = {**sizes, "device": "cpu (2 threads)", "train_seconds": 60.4}
     metrics = {"headline": "psnr_subject", "asset": scores, "cost": cost}
+    size = {"width": 128, "height": 192}
     cameras = [
-        {"name": name, "split": split, "width": 128, "height": 192, "w2c": w2c}
-        for name, split, w2c in (
-            ("A", "train", [[0, 1, 0, 0], [0, 0, -1, 0], [-1, 0, 0, 1]]),
-            ("B", "holdout", [[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 1]]),
-        )
+        {"name": "A", "split": "train", **size, "w2c": [[0, 1, 0, 0], [0, 0, -1, 0], [-1, 0, 0, 1]]},
+        {"name": "B", "split": "holdout", **size, "w2c": [[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 1]]},
     ]
     write_json(tmp_path / "actor" / "metrics.json", metrics)
     write_json(tmp_path / "actor" / "scene" / "scene.json", {"cameras": cameras, "frame_ids": ["0", "1"]})

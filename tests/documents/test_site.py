@@ -9,18 +9,8 @@ from pathlib import Path
 import pytest
 
 import facefolds_core
-from docs.tools.site import (
-    ACTOR,
-    FRAME,
-    HERO,
-    HERO_COMMIT,
-    api_page,
-    first_page,
-    has_photos,
-    hero_age,
-    playing_page,
-    relinked,
-)
+from docs.tools import site
+from docs.tools.site import ACTOR, FRAME, HERO, HERO_COMMIT, first_page, has_photos, hero_age, playing_page, relinked
 from facefolds_core.errors import UserError
 from tests.assets import make_asset
 from tests.viewer.fixtures import rich_asset
@@ -43,17 +33,11 @@ def test_links_lead_to_where_a_page_moved(source: str, link: str, moved: str, pr
     assert relinked(f"[x]({link})", source, project_root) == (f"[x]({moved})", set())
 
 
-def test_other_files_go_along(project_root: Path) -> None:
+def test_other_files_go_along_code_is_left_alone_and_a_link_to_nothing_is_refused(project_root: Path) -> None:
     text, wanted = relinked("[keys](params.yaml)", "README.md", project_root)
     assert (text, wanted) == ("[keys](files/params.yaml)", {"params.yaml"})
-
-
-def test_code_is_left_alone(project_root: Path) -> None:
     code = "```md\n[x](nowhere.md)\n```"
     assert relinked(code, "README.md", project_root)[0] == code
-
-
-def test_a_link_to_nothing_is_refused(project_root: Path) -> None:
     with pytest.raises(UserError, match="leads to nothing"):
         relinked("[x](gone.md)", "README.md", project_root)
 
@@ -118,5 +102,5 @@ def test_a_hero_with_photos_is_held_against_one(tmp_path: Path) -> None:
 
 
 def test_the_librarys_page_has_every_name() -> None:
-    page = api_page()
+    page = site.api_page()
     assert all(f"heading: {name}\n" in page for name in facefolds_core.__all__ if not name.startswith("__"))

@@ -46,9 +46,11 @@ def test_blocks_of_rows_give_what_the_whole_matrix_gives(source: int, target: in
     assert (Bands(np.zeros((70, 9), np.float32)) @ np.ones((9, 2), np.float32) == 0).all()
 
 
-def test_the_same_grid_keeps_every_texel() -> None:
+def test_the_same_grid_keeps_every_texel_and_beyond_the_image_its_border_goes_on() -> None:
     image = smooth_noise(16)
     assert np.abs(Projection((16, 16), (16, 16))(image) - image).max() < 1e-5
+    grey = np.full((8, 8, 1), 0.5, np.float32)
+    assert np.abs(Projection((8, 8), (16, 16), (-1.0, 2.0, -1.0, 2.0))(grey) - 0.5).max() < 1e-6
 
 
 def test_a_finer_grid_over_whole_texels_shows_the_same() -> None:
@@ -66,8 +68,3 @@ def test_an_edge_does_not_overshoot() -> None:
     assert found.min() >= 0
     assert found.max() <= 1
     assert (found[:, :14] == 0).all()
-
-
-def test_beyond_the_image_its_border_goes_on() -> None:
-    image = np.full((8, 8, 1), 0.5, np.float32)
-    assert np.abs(Projection((8, 8), (16, 16), (-1.0, 2.0, -1.0, 2.0))(image) - 0.5).max() < 1e-6

@@ -18,17 +18,13 @@ from facefolds_core.export.poisson import gather_samples, reconstruct
 from facefolds_core.export.sampling import sample_grids
 from facefolds_core.export.sheets import grid_sheets
 from facefolds_core.export.stores import Grids
-from facefolds_core.facts import fact
+from facefolds_core.facts import Fact, fact
 from facefolds_core.files.frame_store import FrameStore, write_frames
 from facefolds_core.files.writing import read_json
 from facefolds_core.geometry.chart import Chart
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.geometry.reflections import ReflectionMaps
-from facefolds_core.params import (
-    DecimateParams,
-    ReconstructParams,
-    TextureParams,
-)
+from facefolds_core.params import DecimateParams, ReconstructParams, TextureParams
 from facefolds_core.pipeline.choices import write_choice
 from facefolds_core.rendering.raster import cast_layers
 from facefolds_core.rendering.reference import composite
@@ -78,6 +74,9 @@ class Filmed:
     scene: Scene
     textures: FrameStore
 
+    def texels(self, maps: ReflectionMaps | None = None) -> tuple[int, Fact]:
+        return choose_texels(self.scene, [ball(64)], matte(maps), self.textures)
+
 
 def film(folder: Path, period: float, noise: float = 0.0, shining: ReflectionMaps | None = None) -> Filmed:
     """Photos of the ball with waves of so many texels, and its texture; with noise on the photos (of 255)."""
@@ -104,22 +103,20 @@ def small(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.parametrize("period, least", [(32.0, 32), (16.0, 48), (5.0, 64)])
 def test_textures_are_no_finer_than_what_they_show(tmp_path: Path, period: float, least: int) -> None:
-    filmed = film(tmp_path, period, noise=20.0)
-    assert choose_texels(filmed.scene, [ball(64)], matte(), filmed.textures)[0] == least
+    assert film(tmp_path, period, noise=20.0).texels()[0] == least
 
 
 def test_textures_fit_into_a_video(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """All layers whole: what a layer does not show is cropped later."""
-    filmed = film(tmp_path, 5.0, noise=20.0)
     monkeypatch.setattr(packing, "MAX_PIXELS", AtlasLayout.pack([(64, 64)]).pixels - 1)
-    assert choose_texels(filmed.scene, [ball(64)], matte(), filmed.textures)[0] == 48
+    assert film(tmp_path, 5.0, noise=20.0).texels()[0] == 48
 
 
 def test_photos_that_the_model_does_not_show_let_no_detail_go(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     filmed = film(tmp_path, 8.0, noise=60.0)
-    assert choose_texels(filmed.scene, [ball(64)], matte(), filmed.textures)[0] == 64
+    assert filmed.texels()[0] == 64
     monkeypatch.setattr(choosing, "FIDELITY", 0.0)
-    assert choose_texels(filmed.scene, [ball(64)], matte(), filmed.textures)[0] == 32
+    assert filmed.texels()[0] == 32
 
 
 def test_meshes_are_no_finer_than_their_shape_needs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -140,10 +137,7 @@ def test_what_photos_reflect_is_not_counted_against_textures(tmp_path: Path) -> 
     parts = (np.full((6, 6), 0.2), np.full((6, 6, 3), 0.1), normals, rng.random((8, 8, 3)))
     shining = ReflectionMaps((-0.7, 0.7, -0.7, 0.7), *(part.astype(np.float32) for part in parts))
     filmed = film(tmp_path, 16.0, shining=shining)
-    matched, unmatched = (
-        max(choose_texels(filmed.scene, [ball(64)], matte(maps), filmed.textures)[1].values["psnr"])
-        for maps in (shining, None)
-    )
+    matched, unmatched = (max(filmed.texels(maps)[1].values["psnr"]) for maps in (shining, None))
     assert matched > 50 > 30 > unmatched
 
 
@@ -160,7 +154,7 @@ def test_where_nothing_can_be_compared_the_finest_is_taken(tmp_path: Path, unsee
         rows = [(i, 0, filmed.scene.open_frames().image(i, 0).copy()) for i in range(1, 5)]
         write_frames(filmed.scene.folder / "frames.arrow", rows[0][2].shape, rows)
         filmed = Filmed(replace(filmed.scene, splits=splits), filmed.textures)
-    chosen, why = choose_texels(filmed.scene, [ball(64)], matte(), filmed.textures)
+    chosen, why = filmed.texels()
     assert chosen == 64 and why.values["tried"] == [64]
 
 
@@ -207,13 +201,10 @@ def test_what_was_chosen_is_said_and_kept(tmp_path: Path) -> None:
 
 
 def test_how_well_an_export_shows_the_photos(tmp_path: Path) -> None:
+    """Nothing is said of one that is clear."""
     filmed = film(tmp_path, 16.0, noise=20.0)
     found = explained(filmed.scene, [ball(64)], [matte().window(0)], None, filmed.textures)
     assert found == pytest.approx(20 * np.log10(255 / 20), abs=0.2)
-
-
-def test_nothing_is_said_of_an_export_that_is_clear(tmp_path: Path) -> None:
-    filmed = film(tmp_path, 16.0)
     write_frames(tmp_path / "clear.arrow", (SIDE, SIDE, 4), [(0, 0, np.zeros((SIDE, SIDE, 4), np.uint8))])
-    textures = FrameStore(tmp_path / "clear.arrow")
-    assert explained(filmed.scene, [ball(64)], [matte().window(0)], None, textures) is None
+    clear = FrameStore(tmp_path / "clear.arrow")
+    assert explained(filmed.scene, [ball(64)], [matte().window(0)], None, clear) is None

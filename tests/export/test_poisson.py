@@ -9,13 +9,7 @@ import numpy as np
 import pytest
 
 from facefolds_core.errors import UserError
-from facefolds_core.export.poisson import (
-    Samples,
-    gather_samples,
-    largest_component,
-    reconstruct,
-    reconstruct_layers,
-)
+from facefolds_core.export.poisson import Samples, gather_samples, largest_component, reconstruct, reconstruct_layers
 from facefolds_core.export.sampling import sample_grids
 from facefolds_core.geometry.meshes import Surface
 from facefolds_core.geometry.sphere_uv import FULL_WINDOW, Window, points_to_uv
@@ -55,8 +49,7 @@ def test_the_surface_covers_the_samples_and_little_more() -> None:
 @pytest.mark.parametrize("window", [FULL_WINDOW, WINDOW], ids=["hemisphere", "window"])
 def test_the_surface_lies_on_the_layer(window: Window) -> None:
     model = Ellipsoids()
-    grids = sample_grids(model, 128, window)
-    result = reconstruct(gather_samples(grids, 0, None), PARAMS, 0)
+    result = reconstruct(gather_samples(sample_grids(model, 128, window), 0, None), PARAMS, 0)
     scaled = (result.vertices - model.centre.numpy()) / np.array(model.axes[0])
     error = np.abs(np.linalg.norm(scaled, axis=-1) - 1) * 0.35
     assert np.median(error) < 2e-4  # seen: 8e-5
@@ -94,16 +87,14 @@ def test_samples_are_evenly_spread_up_to_the_poles() -> None:
     assert samples.spacing.max() < 1.6 * 0.3 * np.pi / 64
 
 
-def test_too_few_samples_name_the_layer() -> None:
-    few = Samples(np.zeros((3, 3)), np.tile([1.0, 0, 0], (3, 1)), np.ones(3))
-    with pytest.raises(UserError, match=r"too few samples[\s\S]*layer 7"):
-        reconstruct(few, PARAMS, 7)
-
-
-def test_samples_that_bound_nothing_name_the_layer() -> None:
-    stacked = Samples(np.full((50, 3), 0.1), np.tile([1.0, 0, 0], (50, 1)), np.zeros(50))
-    with pytest.raises(UserError, match=r"no surface[\s\S]*layer 3[\s\S]*remedy"):
-        reconstruct(stacked, PARAMS, 3)
+@pytest.mark.parametrize(
+    ("count", "place", "said"),
+    [(3, 0.0, r"too few[\s\S]*layer 7"), (50, 0.1, r"no surface[\s\S]*layer 7[\s\S]*remedy")],
+)
+def test_samples_that_bound_nothing_name_the_layer(count: int, place: float, said: str) -> None:
+    stacked = Samples(np.full((count, 3), place), np.tile([1.0, 0, 0], (count, 1)), np.zeros(count))
+    with pytest.raises(UserError, match=said):
+        reconstruct(stacked, PARAMS, 7)
 
 
 def test_a_missing_libgl_is_named(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -19,32 +19,26 @@ from facefolds_core.geometry.sphere_uv import FULL_WINDOW, Window, points_to_uv,
 from facefolds_core.model.textures import TexelGrid
 from tests.ellipsoids import Ellipsoids
 
-SPHERES = ((0.35, 0.35, 0.35), (0.30, 0.30, 0.30))
 WINDOW: Window = (-0.5, 0.6, -0.3, 0.4)
 
 
 @pytest.mark.parametrize("window", [FULL_WINDOW, WINDOW])
-def test_points_lie_on_the_layers_at_the_grids_uv(window: Window) -> None:
-    model = Ellipsoids(axes=SPHERES)
-    grids = sample_grids(model, 24, window)
-    uv, radius = points_to_uv(grids.points.astype(np.float64), model.centre.numpy())
-    assert np.abs(uv - texel_uv(24, 24, window)).max() < 1e-5
-    assert np.abs(radius - np.array([0.35, 0.30])[:, None, None]).max() < 1e-6
-
-
-@pytest.mark.parametrize("window", [FULL_WINDOW, WINDOW])
-def test_normals_of_an_ellipsoid(window: Window) -> None:
+def test_points_lie_on_the_layers_at_the_grids_uv_with_their_normals(window: Window) -> None:
     model = Ellipsoids()
     grids = sample_grids(model, 96, window)
+    uv, _ = points_to_uv(grids.points.astype(np.float64), model.centre.numpy())
+    assert np.abs(uv - texel_uv(96, 96, window)).max() < 1e-5
     for points, normals, axes in zip(grids.points, grids.normals, model.axes, strict=True):
-        true = (points - model.centre.numpy()) / np.array(axes) ** 2
+        offset = points - model.centre.numpy()
+        assert np.abs(np.linalg.norm(offset / np.array(axes), axis=-1) - 1).max() < 2.5e-6  # 1e-6 units
+        true = offset / np.array(axes) ** 2
         true /= np.linalg.norm(true, axis=-1, keepdims=True)
         cosine = (true * normals).sum(-1)
         assert np.degrees(np.arccos(cosine.clip(-1, 1))).max() < 2.0  # seen: 1.3, one-sided at the poles
 
 
 def test_noise_of_the_search_does_not_turn_the_normals_at_the_poles() -> None:
-    model = Ellipsoids(axes=SPHERES)
+    model = Ellipsoids(axes=((0.35, 0.35, 0.35), (0.30, 0.30, 0.30)))
     grids = sample_grids(model, 128, FULL_WINDOW)
     outward = grids.points[0] - model.centre.numpy()
     outward /= np.linalg.norm(outward, axis=-1, keepdims=True)
@@ -97,17 +91,9 @@ def test_textures_are_transparent_where_the_layer_is_missing() -> None:
     assert (image[grids.valid[0], 3] > 0).all()
 
 
-def test_a_layer_without_any_point_is_named() -> None:
-    with pytest.raises(UserError, match="layer 0"):
-        sample_grids(Ellipsoids(hole=9.0), 16, WINDOW)
-
-
 @dataclass(frozen=True)
 class Broken(Ellipsoids):
     """NaN in one point, NaN in one texel."""
-
-    def texel_grid(self) -> None:
-        return None
 
     def surface_points(self, uv: Tensor) -> tuple[Tensor, Tensor]:
         points, valid = super().surface_points(uv)
@@ -120,12 +106,11 @@ class Broken(Ellipsoids):
         return rgb, alpha
 
 
-def test_nan_in_the_surface_is_caught() -> None:
+def test_a_layer_without_any_point_and_nan_are_named() -> None:
+    with pytest.raises(UserError, match="layer 0"):
+        sample_grids(Ellipsoids(hole=9.0), 16, WINDOW)
     with pytest.raises(UserError, match=r"not finite[\s\S]*layer 1"):
         sample_grids(Broken(), 16, WINDOW)
-
-
-def test_nan_in_a_texture_is_caught() -> None:
     grids = sample_grids(Ellipsoids(), 16, WINDOW)
     with pytest.raises(UserError, match=r"not finite[\s\S]*layer 0, frame 0"):
         next(texture_rows(Broken(), grids))

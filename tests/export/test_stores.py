@@ -25,6 +25,7 @@ from facefolds_core.export.stores import (
 )
 from facefolds_core.geometry.chart import Belt, Chart
 from facefolds_core.geometry.meshes import Surface, TexturedMesh
+from facefolds_core.geometry.torso import Torso
 from tests.assets import TORSO
 from tests.ellipsoids import Ellipsoids
 
@@ -38,12 +39,20 @@ def grids() -> Grids:
     return sample_grids(Ellipsoids(), 8, (-0.5, 0.5, -0.5, 0.5))
 
 
-def test_grids_round_trip(tmp_path: Path, grids: Grids) -> None:
-    write_grids(tmp_path / "grids.npz", grids)
-    back = read_grids(tmp_path / "grids.npz")
+BELTS = pytest.mark.parametrize("belt", [None, Belt(0.2, 0.3)])
+
+
+@BELTS
+@pytest.mark.parametrize("torso", [None, TORSO])
+def test_grids_round_trip(tmp_path: Path, grids: Grids, belt: Belt | None, torso: Torso | None) -> None:
+    """Chart and torso can be read without the samples."""
+    path, chart = tmp_path / "grids.npz", Chart((0.1, 0.2, 0.3), belt)
+    write_grids(path, replace(grids, chart=chart, torso=torso))
+    back = read_grids(path)
     for name in ("points", "normals", "valid", "opacity", "windows"):
         assert np.array_equal(getattr(back, name), getattr(grids, name))
-    assert back.chart == grids.chart
+    places = read_places(path)
+    assert places[1] == back.chart == chart and places[3] == back.torso == torso
 
 
 def test_meshes_and_surfaces_round_trip_and_are_the_same_bytes_each_time(tmp_path: Path) -> None:
@@ -58,7 +67,7 @@ def test_meshes_and_surfaces_round_trip_and_are_the_same_bytes_each_time(tmp_pat
     assert np.array_equal(back.vertices, TRIANGLE.vertices)
 
 
-@pytest.mark.parametrize("belt", [None, Belt(0.2, 0.3)])
+@BELTS
 def test_sheets_round_trip(tmp_path: Path, grids: Grids, belt: Belt | None) -> None:
     sheets = replace(grid_sheets(grids, None), chart=Chart((0.1, 0.2, 0.3), belt))
     write_sheets(tmp_path / "sheets.npz", sheets)
@@ -66,18 +75,6 @@ def test_sheets_round_trip(tmp_path: Path, grids: Grids, belt: Belt | None) -> N
     assert isinstance(back, Sheets)
     for field in fields(sheets):
         assert np.array_equal(getattr(back, field.name), getattr(sheets, field.name))
-
-
-@pytest.mark.parametrize("belt", [None, Belt(0.2, 0.3)])
-def test_the_chart_can_be_read_without_the_samples(tmp_path: Path, grids: Grids, belt: Belt | None) -> None:
-    chart = Chart((0.1, 0.2, 0.3), belt)
-    write_grids(tmp_path / "grids.npz", replace(grids, chart=chart))
-    assert read_places(tmp_path / "grids.npz")[1] == read_grids(tmp_path / "grids.npz").chart == chart
-
-
-def test_a_torso_comes_back_with_the_samples(tmp_path: Path, grids: Grids) -> None:
-    write_grids(tmp_path / "grids.npz", replace(grids, torso=TORSO))
-    assert read_places(tmp_path / "grids.npz")[3] == read_grids(tmp_path / "grids.npz").torso == TORSO
 
 
 @pytest.mark.parametrize("length", [0, 10, 500, 2000])
@@ -89,20 +86,14 @@ def test_a_truncated_file_is_an_error(tmp_path: Path, grids: Grids, length: int)
         read_grids(path)
 
 
-def test_a_missing_file_is_named(tmp_path: Path) -> None:
-    with pytest.raises(UserError, match=r"surfaces\.npz"):
-        read_surfaces(tmp_path / "surfaces.npz")
-
-
-def test_a_lone_array_is_an_error(tmp_path: Path) -> None:
+def test_what_is_missing_a_lone_array_or_pickled_is_refused(tmp_path: Path) -> None:
     with (tmp_path / "grids.npz").open("wb") as file:
         np.save(file, np.zeros(3))
+    np.savez(tmp_path / "meshes.npz", vertices_00=np.array([{}], object))
+    with pytest.raises(UserError, match=r"surfaces\.npz"):
+        read_surfaces(tmp_path / "surfaces.npz")
     with pytest.raises(UserError, match="damaged"):
         read_grids(tmp_path / "grids.npz")
-
-
-def test_pickled_objects_are_refused(tmp_path: Path) -> None:
-    np.savez(tmp_path / "meshes.npz", vertices_00=np.array([{}], object))
     with pytest.raises(UserError, match="damaged"):
         read_meshes(tmp_path / "meshes.npz")
 

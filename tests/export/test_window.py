@@ -33,14 +33,12 @@ def test_the_window_fits_the_scene() -> None:
     assert 0.29 < v1 < 0.4
 
 
-def test_an_invisible_model_keeps_the_whole_hemisphere() -> None:
-    assert visible_window(Ellipsoids(patch=1e-6), RIG[:1]) == FULL_WINDOW
-
-
 @pytest.mark.parametrize("patch", [1e-6, 0.6])
 def test_no_window_is_larger_than_the_models(patch: float) -> None:
+    """All of it is kept of one that cannot be seen."""
     own = (-0.1, 0.2, -0.15, 0.25)
     assert visible_window(Ellipsoids(patch=patch, window=own), RIG[:2]) == own
+    assert visible_window(Ellipsoids(patch=1e-6), RIG[:1]) == FULL_WINDOW
 
 
 def test_the_first_the_middle_and_the_last_frame_are_looked_at() -> None:

@@ -19,11 +19,8 @@ def similarity(seed: int) -> Similarity:
 POINTS = np.random.default_rng(0).normal(size=(4, 5, 3)) * 100
 
 
-def test_identity_moves_nothing() -> None:
+def test_identity_moves_nothing_and_the_inverse_undoes() -> None:
     assert np.array_equal(Similarity.identity().apply(POINTS), POINTS)
-
-
-def test_inverse_undoes() -> None:
     assert similarity(1).inverse().apply(similarity(1).apply(POINTS)) == pytest.approx(POINTS)
 
 

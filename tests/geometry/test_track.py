@@ -32,17 +32,16 @@ def test_halfway_between_frames_is_half_the_turn_and_half_the_shift() -> None:
     pose = Track.of(TURNS, SHIFTS).at(0.5)
     assert np.abs(pose.rotation - about((0, 0, 1), 5)).max() < 1e-9
     assert pose.translation == pytest.approx([0.05, 0, 0])
-
-
-def test_the_shorter_arc_is_taken() -> None:
+    # Along the shorter arc.
     q = quaternion(about((0, 1, 0), 40))
     assert np.abs(rotation(slerp(q, -quaternion(about((0, 1, 0), 60)), 0.5)) - about((0, 1, 0), 50)).max() < 1e-9
 
 
-def test_times_beyond_the_ends_are_held() -> None:
+def test_times_beyond_the_ends_are_held_and_the_nearest_frame_turns_least() -> None:
     track = Track.of(TURNS, SHIFTS)
     assert np.array_equal(track.at(7.5).translation, track.at(2).translation)
     assert np.array_equal(track.at(-1).translation, track.at(0).translation)
+    assert Track.of(TURNS[::-1], SHIFTS[::-1]).nearest() == 2  # the frame that turns least
 
 
 def test_a_camera_sees_a_point_of_the_head_where_it_is_in_the_world() -> None:
@@ -50,10 +49,6 @@ def test_a_camera_sees_a_point_of_the_head_where_it_is_in_the_world() -> None:
     point = np.array([[0.1, 0.02, 0.05]])
     expected = camera.project(track.at(2).apply(point))[0]
     assert track.camera(camera, 2).project(point)[0] == pytest.approx(expected)
-
-
-def test_the_nearest_frame_turns_least() -> None:
-    assert Track.of(TURNS[::-1], SHIFTS[::-1]).nearest() == 2
 
 
 @pytest.mark.parametrize(

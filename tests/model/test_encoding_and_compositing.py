@@ -17,10 +17,6 @@ def test_encoding_closed_form() -> None:
     encoded = positional_encoding(x, 3)
     assert encoded.shape[-1] == encoded_size(2, 3)
     torch.testing.assert_close(encoded, torch.tensor([expected], dtype=torch.float64))
-
-
-def test_encoding_without_octaves_is_the_input() -> None:
-    x = torch.rand(4, 3)
     assert torch.equal(positional_encoding(x, 0), x)
 
 
@@ -30,9 +26,6 @@ def test_weights_closed_form() -> None:
     expected = torch.tensor([[0.5, 0.5 * 0.25, 0.5 * 0.75 * 0.8]], dtype=torch.float64)
     torch.testing.assert_close(weights, expected)
     torch.testing.assert_close(transmittance, torch.tensor([0.5 * 0.75 * 0.2], dtype=torch.float64))
-
-
-def test_weights_and_transmittance_add_up_to_one() -> None:
     alpha = torch.rand(100, 12, generator=torch.Generator().manual_seed(0), dtype=torch.float64)
     weights, transmittance = compositing_weights(alpha)
     torch.testing.assert_close(weights.sum(-1) + transmittance, torch.ones(100, dtype=torch.float64))

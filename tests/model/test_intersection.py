@@ -19,11 +19,8 @@ RADIUS = 0.45
 def camera_rays(count: int, spread: float = 0.25) -> tuple[Tensor, Tensor]:
     """Rays from a unit away in front, towards points around the origin; seeded, float64."""
     generator = torch.Generator().manual_seed(3)
-    origins = torch.nn.functional.normalize(
-        torch.tensor([1.0, 0, 0], dtype=torch.float64)
-        + 0.8 * (torch.rand(count, 3, generator=generator) - 0.5).double(),
-        dim=-1,
-    )
+    beside = 0.8 * (torch.rand(count, 3, generator=generator) - 0.5).double()
+    origins = torch.nn.functional.normalize(torch.tensor([1.0, 0, 0], dtype=torch.float64) + beside, dim=-1)
     targets = spread * (2 * torch.rand(count, 3, generator=generator).double() - 1)
     return origins, torch.nn.functional.normalize(targets - origins, dim=-1)
 
@@ -145,9 +142,8 @@ def test_no_surface_behind_the_centre_plane() -> None:
     # Rays that pass above the front half and would meet the spheres at n_x < 0 only.
     z = torch.linspace(0.24, 0.29, 9, dtype=torch.float64)
     targets = torch.stack([torch.full_like(z, -0.3), torch.zeros_like(z), z], -1)
-    directions = torch.nn.functional.normalize(torch.tensor([[-1.0, 0, -1.5]], dtype=torch.float64), dim=-1).expand(
-        9, 3
-    )
+    down = torch.tensor([[-1.0, 0, -1.5]], dtype=torch.float64)
+    directions = torch.nn.functional.normalize(down, dim=-1).expand(9, 3)
     origins = targets - 0.8 * directions
     offset = origins - CENTRE
     along = (offset * directions).sum(-1)
@@ -160,13 +156,8 @@ def test_no_surface_behind_the_centre_plane() -> None:
 
 @pytest.mark.parametrize(
     ("origin", "direction"),
-    [
-        (
-            [-1.0, 0.02, 0.01],
-            [1.0, 0, 0],
-        ),  # from behind: it enters inside the surface and leaves it outwards
-        ([0.0, 0, 0], [-1.0, 0, 0]),  # from inside
-    ],
+    # From behind (it enters inside the surface and leaves it outwards), and from inside.
+    [([-1.0, 0.02, 0.01], [1.0, 0, 0]), ([0.0, 0, 0], [-1.0, 0, 0])],
 )
 def test_only_a_way_in_is_a_crossing(origin: list[float], direction: list[float]) -> None:
     origins, directions = torch.tensor([origin], dtype=torch.float64), torch.tensor([direction], dtype=torch.float64)

@@ -1,6 +1,7 @@
 """The model as its users see it: initialisation, latents, rendering, export queries, files."""
 
 import math
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -14,25 +15,13 @@ from facefolds_core.model.radiance import RadianceManifolds
 from facefolds_core.model.storage import ModelSpec, build_model
 
 LEVELS = (0.36, 0.34, 0.32, 0.30)
+FEW = {"uv_frequencies": 3, "level_frequencies": 2, "view_frequencies": 1, "search_samples": 48}
 
 
 def spec(**values: object) -> ModelSpec:
-    base = {
-        "centre": SPHERE_CENTRE,
-        "levels": LEVELS,
-        "radius": 0.42,
-        "num_frames": 3,
-        "manifold_layers": 2,
-        "manifold_width": 16,
-        "search_samples": 48,
-        "texture_layers": 2,
-        "texture_width": 16,
-        "latent_dim": 4,
-        "uv_frequencies": 3,
-        "level_frequencies": 2,
-        "view_frequencies": 1,
-    }
-    return ModelSpec.model_validate({**base, **values})
+    place = {"centre": SPHERE_CENTRE, "levels": LEVELS, "radius": 0.42, "num_frames": 3}
+    manifold, texture = ({f"{part}_layers": 2, f"{part}_width": 16} for part in ("manifold", "texture"))
+    return ModelSpec.model_validate({**place, **manifold, **texture, "latent_dim": 4, **FEW, **values})
 
 
 def make_model(seed: int = 0) -> RadianceManifolds:
@@ -129,13 +118,13 @@ def test_rays_that_miss_everything_are_black_and_clear() -> None:
 
 
 def test_saved_model_loads_to_the_same_picture(tmp_path: Path) -> None:
+    """And loading leaves the random state alone."""
     model = make_model()
     save_model(model, spec(), tmp_path)
+    before = torch.get_rng_state()
     loaded = load_model(tmp_path)
-    origins, directions = rays()
-    assert torch.equal(
-        loaded.render(origins, directions, 0.5, True).rgb, model.render(origins, directions, 0.5, True).rgb
-    )
+    assert torch.equal(torch.get_rng_state(), before)
+    assert torch.equal(*(one.render(*rays(), 0.5, True).rgb for one in (model, loaded)))
 
 
 def test_a_model_keeps_its_scales(tmp_path: Path) -> None:
@@ -143,13 +132,6 @@ def test_a_model_keeps_its_scales(tmp_path: Path) -> None:
     save_model(build_model(other), other, tmp_path)
     manifolds = load_model(tmp_path).manifolds
     assert (manifolds.scale, manifolds.output_scale) == (pytest.approx(2.5 / LEVELS[0]), 0.5)
-
-
-def test_loading_leaves_the_random_state_alone(tmp_path: Path) -> None:
-    save_model(make_model(), spec(), tmp_path)
-    before = torch.get_rng_state()
-    load_model(tmp_path)
-    assert torch.equal(torch.get_rng_state(), before)
 
 
 def test_model_json_of_another_configuration(tmp_path: Path) -> None:
@@ -160,21 +142,25 @@ def test_model_json_of_another_configuration(tmp_path: Path) -> None:
     assert caught.value.expected != caught.value.found
 
 
-@pytest.mark.parametrize("damage", ["missing", "truncated", "garbled json", "unknown key"])
-def test_damaged_model_folder(tmp_path: Path, damage: str) -> None:
+@pytest.mark.parametrize(
+    ("name", "spoil"),
+    [
+        ("model.safetensors", lambda _: None),
+        ("model.safetensors", lambda whole: whole[:100]),
+        ("model.json", lambda _: b"{"),
+        ("model.json", lambda _: b'{"format": "something else"}'),
+    ],
+    ids=["missing", "truncated", "garbled json", "unknown key"],
+)
+def test_damaged_model_folder(tmp_path: Path, name: str, spoil: Callable[[bytes], bytes | None]) -> None:
     save_model(make_model(), spec(), tmp_path)
-    tensors, description = tmp_path / "model.safetensors", tmp_path / "model.json"
-    if damage == "missing":
-        tensors.unlink()
-    elif damage == "truncated":
-        tensors.write_bytes(tensors.read_bytes()[:100])
-    elif damage == "garbled json":
-        description.write_text("{")
-    else:
-        description.write_text('{"format": "something else"}')
+    left = spoil((tmp_path / name).read_bytes())
+    (tmp_path / name).unlink()
+    if left is not None:
+        (tmp_path / name).write_bytes(left)
     with pytest.raises(UserError) as caught:
         load_model(tmp_path)
-    assert caught.value.file in (tensors, description) and caught.value.remedy
+    assert caught.value.file == tmp_path / name and caught.value.remedy
 
 
 def test_numbers_that_are_not_finite_are_refused(tmp_path: Path) -> None:

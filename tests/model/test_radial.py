@@ -34,16 +34,20 @@ def _rays(count: int, seed: int = 0) -> tuple[torch.Tensor, torch.Tensor]:
     return origins, torch.nn.functional.normalize(targets - origins, dim=1)
 
 
+def _distance(origins: torch.Tensor, directions: torch.Tensor, radius: float) -> torch.Tensor:
+    """To the near side of a sphere about C; NaN beside it."""
+    offset = origins - torch.tensor(C)
+    b = (offset * directions).sum(1)
+    return -b - (b**2 - offset.square().sum(1) + radius**2).sqrt()
+
+
 @pytest.mark.parametrize("grad", [False, True])
 def test_concentric_spheres_in_closed_form(grad: bool) -> None:
-    manifolds = _spheres()
     origins, directions = _rays(200)
-    offset = origins - manifolds.centre
-    b = (offset * directions).sum(1)
     with torch.set_grad_enabled(grad):
-        crossings = manifolds.crossings(origins, directions)
+        crossings = _spheres().crossings(origins, directions)
     for layer, radius in enumerate((0.33, 0.30, 0.27)):
-        expected = -b - (b**2 - offset.square().sum(1) + radius**2).sqrt()
+        expected = _distance(origins, directions, radius)
         hit = crossings.hit[:, layer]
         assert hit.float().mean() > 0.9
         torch.testing.assert_close(crossings.distance[hit, layer], expected[hit], atol=3e-6, rtol=0)
@@ -119,16 +123,13 @@ def _two_surfaces() -> RadialManifolds:
 def test_a_second_surface_is_met_where_it_is(grad: bool) -> None:
     manifolds = _two_surfaces()
     origins, directions = _rays(400, seed=3)
-    offset = origins - manifolds.centre
-    b = (offset * directions).sum(1)
     with torch.set_grad_enabled(grad):
         found = manifolds.crossings(origins, directions)
     assert found.hit.shape == (400, 5) and manifolds.num_layers == 5
     for layer, radius in enumerate((0.33, 0.30, 0.27, 0.2, 0.19)):
-        expected = -b - (b**2 - offset.square().sum(1) + radius**2).sqrt()
-        points = origins + expected[:, None] * directions
-        u = points_to_uv(points, manifolds.centre)[0][:, 0]
-        there = expected.isfinite() & (u.abs() < 0.55) & (points_to_uv(points, manifolds.centre)[0][:, 1].abs() < 0.55)
+        expected = _distance(origins, directions, radius)
+        u, v = points_to_uv(origins + expected[:, None] * directions, manifolds.centre)[0].unbind(1)
+        there = expected.isfinite() & (u.abs() < 0.55) & (v.abs() < 0.55)
         above, below = there & (u > 0.06), there & (u < -0.03)
         assert above.sum() > 20 and below.sum() > 20
         assert found.hit[above, layer].all()

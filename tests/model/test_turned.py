@@ -73,16 +73,14 @@ def test_layers_are_crossed_where_their_mesh_is(pose: Similarity) -> None:
         made = manifolds.chart.points(uv.numpy(), radii)
         posed, faces = TORSO.posed(made, pose).astype(np.float32), grid_faces(n)
         mesh = EmbreeMesh(posed, faces).nearest(origins, directions)
-        hit = mesh.triangle != MISS
-        there = np.einsum("rk,rkc->rc", mesh.barycentric[hit], made[faces[mesh.triangle[hit]]])
-        distance = np.einsum("rk,rkc->rc", mesh.barycentric[hit], posed[faces[mesh.triangle[hit]]].astype(float))
-        distance = np.linalg.norm(distance - origins[hit], axis=1)
-        assert (found.hit[:, layer].numpy() == hit).mean() > 0.995
-        own = found.hit[:, layer].numpy()[hit]
-        assert own.mean() > 0.995
-        off = np.linalg.norm(found.points[:, layer].numpy()[hit] - there, axis=1)[own]
+        hit, corners = mesh.triangle != MISS, faces[mesh.triangle]
+        own = found.hit[:, layer].numpy()
+        assert (own == hit).mean() > 0.995 and own[hit].mean() > 0.995
+        both = own & hit
+        there, seen = (np.einsum("rk,rkc->rc", mesh.barycentric[both], of[corners[both]]) for of in (made, posed))
+        off = np.linalg.norm(found.points[:, layer].numpy()[both] - there, axis=1)
         assert np.quantile(off, 0.98) < 1e-3
-        far = np.abs(found.distance[:, layer].numpy()[hit] - distance)[own]
+        far = np.abs(found.distance[:, layer].numpy()[both] - np.linalg.norm(seen - origins[both], axis=1))
         assert np.quantile(far, 0.98) < 1e-3
     assert (TORSO.share(found.points.numpy()[found.hit.numpy()]) > 0.99).mean() > 0.05
 

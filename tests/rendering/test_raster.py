@@ -18,10 +18,8 @@ def bumpy(seed: int, n: int = 24) -> TexturedMesh:
     """A height field around the origin that hides parts of itself."""
     rng = np.random.default_rng(seed)
     t, s = np.meshgrid(np.linspace(0, 1, n), np.linspace(0, 1, n), indexing="ij")
-    points = np.stack([rng.uniform(-0.15, 0.15, s.shape), s - 0.5, 0.5 - t], -1).reshape(-1, 3)
-    return TexturedMesh(
-        points.astype(np.float32), grid_faces(n), np.stack([s, t], -1).reshape(-1, 2).astype(np.float32)
-    )
+    points, st = np.stack([rng.uniform(-0.15, 0.15, s.shape), s - 0.5, 0.5 - t], -1), np.stack([s, t], -1)
+    return TexturedMesh(points.reshape(-1, 3).astype(np.float32), grid_faces(n), st.reshape(-1, 2).astype(np.float32))
 
 
 @pytest.mark.parametrize("angles", [(0, 0), (60, 30), (85, -5), (180, 0)])

@@ -57,9 +57,8 @@ def test_the_truth_has_no_error_but_rounding(room: np.ndarray | None) -> None:
 def test_haze_costs_over_white_and_grey_what_it_does_not_over_black() -> None:
     """Black haze of opacity h where there is nothing: h over white, h / 2 over grey, none over black."""
     cut = Cutout(np.zeros((8, 8, 3)), np.zeros((8, 8)))
-    haze = 0.4
-    found = squared_error(np.zeros((8, 8, 3)), np.full((8, 8), haze), cut)
-    assert found == pytest.approx(np.full((8, 8), (haze**2 + (haze / 2) ** 2) / 3), abs=2e-3)
+    found = squared_error(np.zeros((8, 8, 3)), np.full((8, 8), 0.4), cut)
+    assert found == pytest.approx(np.full((8, 8), (0.4**2 + 0.2**2) / 3), abs=2e-3)
 
 
 def test_a_hole_costs_whatever_is_behind_it() -> None:
@@ -69,24 +68,16 @@ def test_a_hole_costs_whatever_is_behind_it() -> None:
 
 
 def test_the_worst_patch_is_found_where_it_is() -> None:
-    error = np.full((SIZE, SIZE), 1e-4)
-    error[20:28, 22:30] = 0.1
-    found = worst_patch(error, disc())
-    assert found is not None
-    assert (found.row, found.column, found.side) == (20, 22, 8)
-    assert found.psnr == pytest.approx(10)
-
-
-def test_what_lies_beside_the_subject_is_no_patch_of_it() -> None:
+    """What lies beside the subject is no patch of it; a patch is an eighth of it."""
     error = np.full((SIZE, SIZE), 1e-4)
     error[:8, :8] = 1
+    beside = worst_patch(error, disc())
+    error[20:28, 22:30] = 0.1
     found = worst_patch(error, disc())
-    assert found is not None
-    assert found.psnr == pytest.approx(40)
+    assert found is not None and beside is not None
+    assert (found.row, found.column, found.side) == (20, 22, 8)
+    assert (beside.psnr, found.psnr) == pytest.approx((40, 10))
     assert worst_patch(error, np.zeros((SIZE, SIZE))) is None
-
-
-def test_a_patch_is_an_eighth_of_the_subject() -> None:
     assert patch_side(np.ones((160, 160))) == 20
 
 

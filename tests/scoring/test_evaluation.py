@@ -11,6 +11,7 @@ import pytest
 import torch
 
 from facefolds_core.asset import Asset
+from facefolds_core.captures.scene import Scene
 from facefolds_core.errors import UserError
 from facefolds_core.files.frame_store import write_frames
 from facefolds_core.geometry.track import Track
@@ -28,13 +29,13 @@ from tests.scenes import look_at_origin
 from tests.scoring.fakes import FRAMES, SIZE, FlatAsset, flat_asset, flat_scene, half_mask, pictures, tiny_model
 
 
-def run(folder: Path, params: EvaluateParams | None = None, **masks: object) -> Evaluation:
-    scene = flat_scene(folder, **masks)  # type: ignore[arg-type]
-    return evaluate(scene, tiny_model(), flat_asset(), params or EvaluateParams(), Perceptual())
+def run(scene: Scene, asset: Asset | None = None, view_bias: float = 0.0, **keys: object) -> Evaluation:
+    """By default of an asset that shows the truth."""
+    return evaluate(scene, tiny_model(view_bias), asset or flat_asset(), EvaluateParams(**keys), Perceptual())  # type: ignore[arg-type]
 
 
 def test_every_image_has_every_score_and_an_asset_that_shows_the_truth_is_perfect(tmp_path: Path) -> None:
-    scores = run(tmp_path).scores
+    scores = run(flat_scene(tmp_path)).scores
     keys = [(s.camera, s.frame, s.variant) for s in scores]
     assert keys == [("front", f"{k:06d}", v) for k in range(FRAMES) for v in VARIANTS]
     assert all(list(s.values) == list(ALL_METRICS) for s in scores)
@@ -51,17 +52,14 @@ def test_an_asset_stands_where_its_own_track_says(tmp_path: Path) -> None:
     track = Track.of([about((1, 1, 0), 20)] * FRAMES, [[0.1, 0.05, 0]] * FRAMES)
     world = tuple(camera.transformed(track.at(0)) for camera in scene.cameras)
     moved = replace(scene, cameras=world, poses=track)
-    asset = cast(Asset, FlatAsset(pictures(), track))
-    found = evaluate(moved, tiny_model(), asset, EvaluateParams(), Perceptual())
-    still = evaluate(scene, tiny_model(), flat_asset(), EvaluateParams(), Perceptual())
+    found, still = run(moved, cast(Asset, FlatAsset(pictures(), track))), run(scene)
     psnrs = [s.values["psnr"] for s in found.scores]
     assert psnrs == pytest.approx([s.values["psnr"] for s in still.scores], abs=1e-3)
-    without = evaluate(moved, tiny_model(), flat_asset(), EvaluateParams(), Perceptual())
-    assert all(cast(float, s.values["psnr"]) < 20 for s in without.scores if s.variant == "asset")
+    assert all(cast(float, s.values["psnr"]) < 20 for s in run(moved).scores if s.variant == "asset")
 
 
 def test_an_image_without_a_mask_and_one_with_an_empty_mask_are_not_counted(tmp_path: Path) -> None:
-    scores = run(tmp_path, masks={0: half_mask(), 2: np.zeros_like(half_mask())}).scores
+    scores = run(flat_scene(tmp_path, {0: half_mask(), 2: np.zeros_like(half_mask())})).scores
     assert [s.values["psnr_subject"] is not None for s in scores if s.variant == "asset"] == [True, False, False]
 
 
@@ -79,13 +77,9 @@ def test_an_error_outside_the_mask_spares_the_subject() -> None:
 
 
 def test_the_background_shows_where_the_model_is_transparent(tmp_path: Path) -> None:
-    scene = flat_scene(tmp_path)
-    panels = [
-        evaluate(scene, tiny_model(), flat_asset(), EvaluateParams(background=b), Perceptual()).panels[0].model
-        for b in ((0.0, 0.0, 0.0), (0.2, 0.4, 0.6))
-    ]
-    corner = [panel[0, 0] for panel in panels]
-    np.testing.assert_allclose(corner, [[0, 0, 0], [0.2, 0.4, 0.6]], atol=1e-12)
+    scene, behind = flat_scene(tmp_path), [(0.0, 0.0, 0.0), (0.2, 0.4, 0.6)]
+    corners = [run(scene, background=colour).panels[0].model[0, 0] for colour in behind]
+    np.testing.assert_allclose(corners, behind, atol=1e-12)
 
 
 def test_the_view_branch_tells_model_from_diffuse() -> None:
@@ -102,65 +96,42 @@ def test_a_view_of_the_model_is_what_the_model_renders(view_effects: bool) -> No
     origins, directions = (torch.tensor(np.reshape(x, (-1, 3)), dtype=torch.float32) for x in fine.rays())
     expected = model.render(origins, directions, 1.5, view_effects)
     on, off, alpha = ModelView(model, camera).render(1.5)
-    size = (fine.height, fine.width)
-    np.testing.assert_allclose(
-        on if view_effects else off, pixel_means(expected.rgb.numpy().reshape(*size, 3)), atol=2e-6
-    )
-    np.testing.assert_allclose(alpha, pixel_means(expected.alpha.numpy().reshape(size)), atol=2e-6)
+    rgb, opacity = (part.numpy().reshape(fine.height, fine.width, -1) for part in (expected.rgb, expected.alpha))
+    np.testing.assert_allclose(on if view_effects else off, pixel_means(rgb), atol=2e-6)
+    np.testing.assert_allclose(alpha, pixel_means(opacity[..., 0]), atol=2e-6)
 
 
 def test_the_shipped_files_are_what_is_scored(tmp_path: Path) -> None:
     asset = make_asset(tmp_path / "asset", layers=2, frames=FRAMES, resolution=32)
-    scene = flat_scene(tmp_path / "scene")
-    found = evaluate(scene, tiny_model(), asset, EvaluateParams(), Perceptual())
+    found = run(flat_scene(tmp_path / "scene"), asset)
     assert len(found.scores) == FRAMES * len(VARIANTS)
     assert found.panels[0].asset.std() > 0.05
 
 
-def test_no_held_out_camera_is_refused(tmp_path: Path) -> None:
+def test_what_cannot_be_scored_is_refused(tmp_path: Path) -> None:
     scene = flat_scene(tmp_path)
-    scene = replace(scene, splits=("train",) * 3)
-    with pytest.raises(UserError, match="no held-out camera") as error:
-        evaluate(scene, tiny_model(), flat_asset(), EvaluateParams(), Perceptual())
-    assert error.value.remedy is not None
-    assert "holdout" in error.value.remedy
-
-
-def test_an_asset_with_another_number_of_frames_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(UserError, match="asset and the scene have different numbers of frames"):
-        evaluate(flat_scene(tmp_path), tiny_model(), flat_asset(pictures()[:2]), EvaluateParams(), Perceptual())
-
-
-def test_nan_in_a_rendering_is_caught(tmp_path: Path) -> None:
-    model = tiny_model(view_bias=float("nan"))
-    with pytest.raises(UserError, match="not finite") as error:
-        evaluate(flat_scene(tmp_path), model, flat_asset(), EvaluateParams(), Perceptual())
-    assert error.value.place == "camera front, frame 000000"
+    with pytest.raises(UserError, match=r"no held-out camera[\s\S]*remedy[\s\S]*holdout"):
+        run(replace(scene, splits=("train",) * 3))
+    with pytest.raises(UserError, match="different numbers of frames"):
+        run(scene, flat_asset(pictures()[:2]))
+    with pytest.raises(UserError, match=r"not finite[\s\S]*camera front, frame 000000"):
+        run(scene, view_bias=float("nan"))
+    write_frames(tmp_path / "frames.arrow", (SIZE, SIZE, 3), [(1, 0, np.zeros((SIZE, SIZE, 3), np.uint8))])
+    with pytest.raises(UserError, match="has a photo"):
+        run(scene)
 
 
 def test_the_subjects_box_has_a_margin_within_the_frame() -> None:
     mask = np.zeros((60, 40))
     mask[20:30, 2:5] = 1
     assert subject_box(mask) == (slice(20 - MASK_MARGIN, 30 + MASK_MARGIN), slice(0, 5 + MASK_MARGIN))
-
-
-def test_a_faint_mask_is_empty() -> None:
-    assert subject_box(np.full((9, 9), 0.05)) is None
+    assert subject_box(np.full((9, 9), 0.05)) is None  # a faint one is empty
 
 
 def test_the_worst_picture_is_kept_though_it_is_not_on_the_sheet(tmp_path: Path) -> None:
     shown = pictures()
     shown[1] = 255 - shown[1]
-    scene = flat_scene(tmp_path, masks={k: half_mask() for k in range(FRAMES)})
-    found = evaluate(scene, tiny_model(), flat_asset(shown), EvaluateParams(sheet_frames=2), Perceptual())
+    found = run(flat_scene(tmp_path, {k: half_mask() for k in range(FRAMES)}), flat_asset(shown), sheet_frames=2)
     assert [panel.frame for panel in found.panels] == ["000000", "000002"]
     assert found.worst.frame == "000001"
     np.testing.assert_array_equal(found.worst.asset, shown[1] / 255)
-
-
-def test_without_a_photo_there_is_nothing_to_score(tmp_path: Path) -> None:
-    scene = flat_scene(tmp_path)
-    picture = np.zeros((SIZE, SIZE, 3), np.uint8)
-    write_frames(tmp_path / "frames.arrow", (SIZE, SIZE, 3), [(1, 0, picture)])
-    with pytest.raises(UserError, match="has a photo"):
-        evaluate(scene, tiny_model(), flat_asset(), EvaluateParams(), Perceptual())

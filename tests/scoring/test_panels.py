@@ -14,12 +14,9 @@ def panel(frame: str, **values: float) -> Panel:
 
 
 def test_the_worst_is_the_one_that_the_headline_calls_so() -> None:
+    """Pictures that lack the headline come last."""
     spikes = panel("spikes", psnr_subject=30.0, psnr_over_plate=17.0)
     blurred = panel("blurred", psnr_subject=22.0, psnr_over_plate=24.0)
     assert min([blurred, spikes], key=lambda one: one.rank) is spikes
-
-
-def test_pictures_that_lack_the_headline_come_last() -> None:
-    whole = panel("whole")
-    subject = panel("subject", psnr_subject=30.0)
+    whole, subject = panel("whole"), panel("subject", psnr_subject=30.0)
     assert min([whole, subject], key=lambda one: one.rank) is subject

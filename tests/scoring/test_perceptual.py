@@ -21,7 +21,11 @@ from facefolds_core.scoring.perceptual import (
     lpips_from,
 )
 
-SHAPES = {0: (64, 3, 11), 3: (192, 64, 5), 6: (384, 192, 3), 8: (256, 384, 3), 10: (256, 256, 3)}
+TRUNK = {
+    **{0: (64, 3, 11, 4, 2), 3: (192, 64, 5, 1, 2), 6: (384, 192, 3, 1, 1)},
+    **{8: (256, 384, 3, 1, 1), 10: (256, 256, 3, 1, 1)},
+}
+"""AlexNet as torchvision numbers it: channels out and in, side of the kernel, stride, padding."""
 
 
 @pytest.fixture(scope="module")
@@ -48,20 +52,18 @@ def noisy(image: Tensor, deviation: float) -> Tensor:
 def random_trunk() -> dict[str, Tensor]:
     generator = torch.Generator().manual_seed(0)
     state: dict[str, Tensor] = {}
-    for i, (out, into, side) in SHAPES.items():
+    for i, (out, into, side, _, _) in TRUNK.items():
         state[f"features.{i}.weight"] = torch.randn(out, into, side, side, generator=generator) / (side * into**0.5)
         state[f"features.{i}.bias"] = torch.zeros(out)
     return state
 
 
-def test_identical_images_are_at_no_distance(st_lpips: PerceptualDistance) -> None:
-    assert float(st_lpips(picture()[None], picture())) == 0
-
-
 def test_more_noise_is_farther_away(st_lpips: PerceptualDistance) -> None:
-    images = torch.stack([noisy(picture(), deviation) for deviation in (0.02, 0.05, 0.1, 0.2, 0.4)])
+    """And none is at no distance; images are scored one by one."""
+    images = torch.stack([noisy(picture(), deviation) for deviation in (0.0, 0.02, 0.05, 0.1, 0.2, 0.4)])
     distances = st_lpips(images, picture())
-    assert (distances.diff() > 0).all()
+    assert distances[0] == 0 and (distances.diff() > 0).all()
+    np.testing.assert_allclose(distances, [float(st_lpips(image[None], picture())) for image in images], rtol=1e-6)
 
 
 def test_a_shift_by_a_pixel_is_nearer_than_noise_of_equal_error(st_lpips: PerceptualDistance) -> None:
@@ -80,28 +82,17 @@ def test_the_value_of_the_published_implementation(st_lpips: PerceptualDistance)
     np.testing.assert_allclose(found, list(expected.values()), rtol=1e-4)
 
 
-def test_images_are_scored_one_by_one(st_lpips: PerceptualDistance) -> None:
-    images = torch.stack([noisy(picture(), 0.1), noisy(picture(), 0.2)])
-    together = st_lpips(images, picture())
-    apart = [float(st_lpips(image[None], picture())) for image in images]
-    np.testing.assert_allclose(together, apart, rtol=1e-6)
-
-
 @pytest.mark.parametrize("size", [(1, 1), (8, 20), (MIN_SIDE - 1, MIN_SIDE)])
 def test_small_images_are_enlarged(st_lpips: PerceptualDistance, size: tuple[int, int]) -> None:
     distance = st_lpips(torch.ones(1, 3, *size), torch.zeros(3, *size))
     assert 0 < float(distance) < 10
 
 
-def test_lpips_without_the_trunk_is_not_reported(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_lpips_without_the_published_trunk_is_not_reported(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setenv("TORCH_HOME", str(tmp_path))
     found = find_perceptual()
     assert found.lpips is None
     assert any(TRUNK_NAME in line for line in found.missing)
-
-
-def test_a_trunk_that_is_not_the_published_one_is_refused(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setenv("TORCH_HOME", str(tmp_path))
     path = tmp_path / "hub" / "checkpoints" / TRUNK_NAME
     path.parent.mkdir(parents=True)
     torch.save(random_trunk(), path)
@@ -109,29 +100,19 @@ def test_a_trunk_that_is_not_the_published_one_is_refused(monkeypatch: pytest.Mo
 
 
 def test_lpips_puts_trunk_and_linear_weights_together() -> None:
-    """The stages by hand, on a random trunk: AlexNet as torchvision numbers it, LPIPS as its paper's eq. 1."""
+    """The stages by hand, on a random trunk: LPIPS as its paper's eq. 1."""
     spec = importlib.util.find_spec(LPIPS_LINEAR[0])
-    assert spec is not None
-    assert spec.submodule_search_locations is not None
-    linear = torch.load(
-        Path(spec.submodule_search_locations[0]) / LPIPS_LINEAR[1], map_location="cpu", weights_only=True
-    )
+    assert spec is not None and spec.submodule_search_locations is not None
+    weights = Path(spec.submodule_search_locations[0]) / LPIPS_LINEAR[1]
+    linear = torch.load(weights, map_location="cpu", weights_only=True)
     trunk = random_trunk()
     truth, image = picture(), noisy(picture(), 0.2)
 
     def features(x: Tensor) -> list[Tensor]:
-        x = (2 * x - 1 - torch.tensor([-0.030, -0.088, -0.188])[:, None, None]) / torch.tensor([0.458, 0.448, 0.450])[
-            :, None, None
-        ]
-        found, f = [], x[None]
-        for i, stride, padding, pool in (
-            (0, 4, 2, False),
-            (3, 1, 2, True),
-            (6, 1, 1, True),
-            (8, 1, 1, False),
-            (10, 1, 1, False),
-        ):
-            f = torch.max_pool2d(f, 3, 2) if pool else f
+        mean, deviation = torch.tensor([[-0.030, -0.088, -0.188], [0.458, 0.448, 0.450]])[..., None, None]
+        found, f = [], ((2 * x - 1 - mean) / deviation)[None]
+        for i, (*_, stride, padding) in TRUNK.items():
+            f = torch.max_pool2d(f, 3, 2) if i in (3, 6) else f
             f = torch.conv2d(f, trunk[f"features.{i}.weight"], trunk[f"features.{i}.bias"], stride, padding).relu()
             found.append(f / (f.norm(dim=1, keepdim=True) + 1e-10))
         return found

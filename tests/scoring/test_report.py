@@ -14,32 +14,16 @@ from facefolds_core.errors import UserError
 from facefolds_core.facts import fact
 from facefolds_core.files.paths import SubjectFolders
 from facefolds_core.files.writing import write_json
+from facefolds_core.scoring import report
 from facefolds_core.scoring.panels import ALL_METRICS, FILM_METRICS, VARIANTS, ImageScore
-from facefolds_core.scoring.report import (
-    EXPORT_STAGES,
-    METRICS_VERSION,
-    averages,
-    headline,
-    metrics_json,
-    read_cost,
-    write_per_image,
-)
+from facefolds_core.scoring.report import EXPORT_STAGES, METRICS_VERSION, averages, headline, metrics_json, read_cost
 from facefolds_core.scoring.temporal import Change
 from tests.assets import cap_crops, make_asset
 from tests.scoring.fakes import evaluation
 
 COST_KEYS = [
-    "train_seconds",
-    "iterations",
-    "device",
-    "export_seconds",
-    "vertices",
-    "triangles",
-    "mesh_bytes",
-    "texture_bytes",
-    "video_bits_per_second",
-    "reflection_bytes",
-    "gpu_bytes",
+    *("train_seconds", "iterations", "device", "export_seconds", "vertices", "triangles", "mesh_bytes"),
+    *("texture_bytes", "video_bits_per_second", "reflection_bytes", "gpu_bytes"),
 ]
 TRAINING = {"seconds": 12.5, "iterations": 300, "device": "cpu (2 threads)", "preset": "quick"}
 
@@ -96,7 +80,7 @@ def test_the_cost_adds_up(folders: SubjectFolders) -> None:
 
 
 def test_per_image_scores_come_back_from_parquet(tmp_path: Path) -> None:
-    write_per_image(SCORES, tmp_path / "scores.parquet")
+    report.write_per_image(SCORES, tmp_path / "scores.parquet")
     rows = pq.read_table(tmp_path / "scores.parquet").to_pylist()
     expected = [
         {"camera": s.camera, "frame": s.frame, "variant": s.variant, **s.values, "split": s.split} for s in SCORES

@@ -13,30 +13,26 @@ from tests.scenes import OPAQUE, cameras_alike, make_scene
 COUNT, EACH = 6, 400
 
 
-def rays(seed: int = 0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def rays() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Colours (R, 3), opacity (R,), camera (R,): all rays of all cameras on the subject."""
-    shown = np.random.default_rng(seed).uniform(0.1, 0.6, (COUNT * EACH, 3)).astype(np.float32)
+    shown = np.random.default_rng(0).uniform(0.1, 0.6, (COUNT * EACH, 3)).astype(np.float32)
     return shown, np.ones(len(shown), np.float32), np.repeat(np.arange(COUNT, dtype=np.int32), EACH)
 
 
-def true_gains() -> np.ndarray:
-    gains = np.random.default_rng(1).uniform(0.7, 1.3, (COUNT, 3))
-    return gains / gains.mean(0)
+DRAWN = np.random.default_rng(1).uniform(0.7, 1.3, (COUNT, 3))
+GAINS = DRAWN / DRAWN.mean(0)
 
 
 def test_gains_are_found_and_their_mean_is_one() -> None:
+    """Some wrong rays change little."""
     shown, alpha, camera = rays()
-    found = camera_gains(shown, alpha, shown * true_gains()[camera].astype(np.float32), camera, COUNT)
+    seen = shown * GAINS[camera].astype(np.float32)
+    found = camera_gains(shown, alpha, seen, camera, COUNT)
     # Drawn towards 1 by DARK^2 over the mean square: 0.3 %.
-    np.testing.assert_allclose(found, true_gains(), rtol=0.005)
+    np.testing.assert_allclose(found, GAINS, rtol=0.005)
     np.testing.assert_allclose(found.mean(0), 1)
-
-
-def test_some_wrong_rays_change_little() -> None:
-    shown, alpha, camera = rays()
-    seen = shown * true_gains()[camera].astype(np.float32)
     seen[::7] = 1.0
-    np.testing.assert_allclose(camera_gains(shown, alpha, seen, camera, COUNT), true_gains(), rtol=0.01)
+    np.testing.assert_allclose(camera_gains(shown, alpha, seen, camera, COUNT), GAINS, rtol=0.01)
 
 
 def test_what_is_behind_does_not_count() -> None:
@@ -63,28 +59,22 @@ def test_small_differences_are_left_alone() -> None:
 
 def test_errors_are_told_without_the_gains() -> None:
     shown, alpha, camera = rays()
-    fit = CameraFit.of(shown, alpha, shown * true_gains()[camera].astype(np.float32), camera, COUNT)
-    np.testing.assert_allclose(fit.gains, true_gains(), rtol=0.01)
+    fit = CameraFit.of(shown, alpha, shown * GAINS[camera].astype(np.float32), camera, COUNT)
+    np.testing.assert_allclose(fit.gains, GAINS, rtol=0.01)
     assert fit.errors.max() < 0.01
 
 
-def test_one_camera_far_off_is_left_out_by_name(tmp_path: Path) -> None:
+def test_one_camera_far_off_is_left_out_by_name_and_cameras_alike_change_nothing(tmp_path: Path) -> None:
     scene = make_scene(tmp_path / "scene", OPAQUE, size=12)
     errors = np.full(COUNT, 0.05)
     errors[3] = 0.05 * MAX_ERROR_RATIO * 1.1
     choice = choose_cameras(scene, replace(cameras_alike(COUNT), errors=errors))
     # Training cameras are 0, 1, 2, 4, 5, 6.
     assert choice.scene.indices("train") == [0, 1, 2, 5, 6] and choice.scene.indices("holdout") == [3]
-    assert [(n.kind, n.camera) for n in choice.notes] == [("camera_contradicts", "cam4")] and choice.gains.shape == (
-        5,
-        3,
-    )
+    assert [(n.kind, n.camera) for n in choice.notes] == [("camera_contradicts", "cam4")]
+    assert choice.gains.shape == (5, 3)
     summary = choice.summary["cam4"]
     assert isinstance(summary, dict) and summary["used"] is False
-
-
-def test_cameras_alike_change_nothing(tmp_path: Path) -> None:
-    scene = make_scene(tmp_path / "scene", OPAQUE, size=12)
     choice = choose_cameras(scene, cameras_alike(COUNT))
     assert choice.scene.splits == scene.splits and choice.notes == ()
     assert (choice.gains == 1).all()

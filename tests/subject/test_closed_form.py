@@ -14,9 +14,8 @@ NOTHING = np.zeros((40, 40), np.float32)
 
 def blended(opacity: np.ndarray) -> np.ndarray:
     """(H, W, 3) float32: skin before a green wall."""
-    return np.asarray(
-        opacity[..., None] * (0.8, 0.6, 0.5) + (1 - opacity[..., None]) * np.array((0.2, 0.4, 0.1)), np.float32
-    )
+    wall, skin = np.float32([[0.2, 0.4, 0.1], [0.8, 0.6, 0.5]])
+    return np.asarray(wall + opacity[..., None] * (skin - wall), np.float32)
 
 
 @pytest.mark.parametrize("width", [1.0, 4.0, 8.0])

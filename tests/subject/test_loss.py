@@ -12,7 +12,7 @@ def test_gradient_of_ssim() -> None:
     random = np.random.default_rng(0)
     x, y = random.random((2, 24, 30)).astype(np.float32)
     gradient = ssim_gradient(x, y)
-    for i, j in ((12, 15), (9, 20), (0, 0), (23, 7)):
+    for i, j in ((12, 15), (9, 20)):  # at the border the mirrored part is not differentiated
         values = []
         for step in (-0.01, 0.01):
             moved = x.copy()
@@ -22,5 +22,4 @@ def test_gradient_of_ssim() -> None:
             assert value is not None
             values.append(value * x.size)
         slope = (values[1] - values[0]) / 0.02
-        if 5 < i < 18 and 5 < j < 24:  # at the border the mirrored part is not differentiated
-            assert abs(gradient[i, j] - slope) < 0.02 * abs(slope) + 2e-3, (i, j)
+        assert abs(gradient[i, j] - slope) < 0.02 * abs(slope) + 2e-3, (i, j)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 from pathlib import Path
 
@@ -12,7 +11,6 @@ from safetensors.torch import load_file
 
 from facefolds_core.captures.scene import Scene
 from facefolds_core.errors import UserError
-from facefolds_core.model import load_model
 from facefolds_core.params import train_params
 from facefolds_core.training import loop
 from facefolds_core.training.checkpoints import CHECKPOINT, fingerprint, load_checkpoint, save_checkpoint
@@ -54,15 +52,6 @@ def test_an_interrupted_run_ends_at_the_same_result(
     assert "continuing from iteration 7" in capsys.readouterr().out
     assert whole.keys() == resumed.keys()
     assert all(torch.equal(whole[name], resumed[name]) for name in whole)
-
-
-def test_the_checkpoint_is_removed_and_the_report_written(scene: Scene, tmp_path: Path) -> None:
-    settings = params(checkpoint_seconds=1e-9)
-    run(scene, settings, tmp_path)
-    report = json.loads((tmp_path / "model" / "training.json").read_text())
-    assert not list((tmp_path / "checkpoints").rglob("*.safetensors"))
-    assert report["iterations"] == 12 and report["device"].startswith("cpu") and report["preset"] == "quick"
-    assert load_model(tmp_path / "model").num_layers == 3
 
 
 def test_divergence_is_caught_and_the_last_checkpoint_kept(

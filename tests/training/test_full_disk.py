@@ -15,21 +15,17 @@ from facefolds_core.training.segments.forecast import check_space
 from tests.hostile.fuzz_disk import limited_files
 
 
-def test_safetensors_fails_like_every_other_file(tmp_path: Path) -> None:
+def test_safetensors_has_the_mode_of_every_other_file_and_fails_like_it(tmp_path: Path) -> None:
     path = tmp_path / "model.safetensors"
     write_tensors(path, {"a": torch.zeros(3)}, {})
+    (tmp_path / "other").touch()
+    assert path.stat().st_mode == (tmp_path / "other").stat().st_mode
     before = path.read_bytes()
     with pytest.raises(OSError) as caught, limited_files(1000):
         write_tensors(path, {"a": torch.zeros(10_000)}, {})
     assert (caught.value.errno, caught.value.filename) == (errno.EFBIG, str(path))
     assert path.read_bytes() == before
-    assert [p.name for p in tmp_path.iterdir()] == [path.name]
-
-
-def test_safetensors_gets_the_mode_of_every_other_file(tmp_path: Path) -> None:
-    write_tensors(tmp_path / "a.safetensors", {"a": torch.zeros(3)}, {})
-    (tmp_path / "b").touch()
-    assert (tmp_path / "a.safetensors").stat().st_mode == (tmp_path / "b").stat().st_mode
+    assert {p.name for p in tmp_path.iterdir()} == {path.name, "other"}
 
 
 def test_a_model_that_would_not_fit_is_not_trained(tmp_path: Path) -> None:

@@ -14,8 +14,6 @@ from facefolds_core.training.explicit.plan import epochs, plan
 from tests.training.test_warnings import WELL
 
 PIXELS = 3_000_000
-
-
 FITTED = replace(WELL, texels=(128, 96))
 
 

@@ -1,5 +1,6 @@
 """Training: rays, losses, recovery of a known radius, divergence, the log."""
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,7 @@ from safetensors.torch import load_file
 
 from facefolds_core.captures.scene import SPHERE_CENTRE, Scene
 from facefolds_core.errors import UserError
+from facefolds_core.model import load_model
 from facefolds_core.model.device import pick_device
 from facefolds_core.params import MlpParams, train_params
 from facefolds_core.training import loop
@@ -136,21 +138,24 @@ def test_the_first_steps_of_the_papers_preset_keep_the_surfaces(tmp_path: Path) 
     assert float(crossings.hit.float().sum(1).median()) >= settings.layers / 2
 
 
-def test_the_log_holds_losses_rates_and_speed(scene: Scene, tmp_path: Path) -> None:
-    run(scene, params(), tmp_path)
-    names = {str(p.relative_to(tmp_path / "log" / "plots" / "metrics")) for p in (tmp_path / "log").rglob("*.tsv")}
-    losses = {f"loss/{name}.tsv" for name in ("total", "reconstruction", "view", "regularisation")}
-    assert names == {*losses, "psnr.tsv", "lr/manifold.tsv", "lr/texture.tsv", "rays_per_second.tsv"}
-
-
-def test_nothing_is_sent_to_dvc_studio(scene: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_run_leaves_its_model_its_report_and_its_log_and_sends_nothing(
+    scene: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """No checkpoint is left, and DVC Studio is told nothing."""
     monkeypatch.setenv("DVC_STUDIO_TOKEN", "token")
     monkeypatch.setenv("DVC_STUDIO_REPO_URL", "git@example.invalid:a/b.git")
     monkeypatch.delenv("DVC_STUDIO_OFFLINE", raising=False)
     sent: list[object] = []
     monkeypatch.setattr("dvclive.studio.post_live_metrics", lambda *a, **k: sent.append(a))
-    run(scene, params(), tmp_path)
+    run(scene, params(checkpoint_seconds=1e-9), tmp_path)
     assert not sent
+    names = {str(p.relative_to(tmp_path / "log" / "plots" / "metrics")) for p in (tmp_path / "log").rglob("*.tsv")}
+    losses = {f"loss/{name}.tsv" for name in ("total", "reconstruction", "view", "regularisation")}
+    assert names == {*losses, "psnr.tsv", "lr/manifold.tsv", "lr/texture.tsv", "rays_per_second.tsv"}
+    assert not list((tmp_path / "checkpoints").rglob("*.safetensors"))
+    report = json.loads((tmp_path / "model" / "training.json").read_text())
+    assert report["iterations"] == 12 and report["device"].startswith("cpu") and report["preset"] == "quick"
+    assert load_model(tmp_path / "model").num_layers == 3
 
 
 def test_parameters_are_untouched_by_a_step_that_diverges(scene: Scene) -> None:
