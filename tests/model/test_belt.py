@@ -24,6 +24,10 @@ BROAD = (-1.2, 0.7, -1.4, 1.4)
 SPEC = ExplicitSpec(centre=C, window=(-1.2, 0.7, -1.4, 1.4), nodes=(6, 7), texels=(8, 9), num_layers=2, num_frames=2)
 
 
+def slanted() -> RadialManifolds:
+    return bumpy(SLANTED, BROAD, 0.25, 60)
+
+
 def rays_around(count: int, seed: int = 0) -> tuple[Tensor, Tensor]:
     """From all sides towards points around the axis, from above the head to below the neck."""
     generator = torch.Generator().manual_seed(seed)
@@ -61,7 +65,7 @@ def test_a_column_is_a_cylinder(grad: bool) -> None:
 
 
 def test_compiled_search_matches_the_reference() -> None:
-    manifolds = bumpy(SLANTED, BROAD, 0.25, 60)
+    manifolds = slanted()
     found = check_compiled(manifolds, *rays_around(800), share=0.995)
     uv, radius = manifolds.chart.uv(found.points[found.hit])
     assert manifolds.chart.below(uv).float().mean() > 0.2
@@ -83,22 +87,9 @@ def test_strides_through_empty_space_miss_nothing(chart: Chart, holes: bool) -> 
     origins, directions = (x.double().numpy() for x in rays_around(3000, seed=1))
     high, whole = heights(rho, edges, belt), rho.shape[2] - holes
     assert (high[0] < rho.min(initial=1, where=~np.isnan(rho))).mean() > 0.1
-    found = [
-        crossing_distances(
-            origins - np.array(C),
-            directions,
-            rho,
-            edges,
-            belt,
-            bounds(rho),
-            h,
-            whole,
-            manifolds.radius,
-            radial.STEP,
-            None,
-        )
-        for h in (high, np.full_like(high, np.inf))
-    ]
+    given = origins - np.array(C), directions, rho, edges, belt, bounds(rho)
+    settings = whole, manifolds.radius, radial.STEP, None
+    found = [crossing_distances(*given, h, *settings) for h in (high, np.full_like(high, np.inf))]
     np.testing.assert_array_equal(*found)
     assert (found[0] > 0).any(1).mean() > 0.5
 
@@ -126,7 +117,7 @@ def test_a_steep_belt_on_a_thin_column() -> None:
 
 def test_distance_gradient_against_finite_differences() -> None:
     """Of a column seen from its front, behind the belt and across it, by rays that graze nothing."""
-    manifolds = bumpy(SLANTED, BROAD, 0.25, 60)
+    manifolds = slanted()
     heights = torch.linspace(0, -0.4, 64)
     targets = manifolds.centre + torch.stack([0 * heights, 0 * heights, heights], -1)
     azimuths = 7 * torch.arange(64) % 64 / 32 - 1
@@ -138,7 +129,7 @@ def test_distance_gradient_against_finite_differences() -> None:
 
 
 def test_the_ball_around_c_holds_the_column() -> None:
-    manifolds = bumpy(SLANTED, BROAD, 0.25, 60)
+    manifolds = slanted()
     uv = torch.tensor([[-1.2, 0.3], [0.7, 0.0], [-0.3, 1.4], [-1.2, -1.4]])
     radii, _ = manifolds.radii_at(uv)
     far = (manifolds.chart.points(uv, radii[:, 0]) - manifolds.centre).norm(dim=-1)
@@ -157,11 +148,9 @@ def test_a_model_keeps_its_chart(tmp_path: Path, belt: Belt | None) -> None:
 @pytest.mark.parametrize(
     "belt",
     [
-        {"elevation": 0.2},
-        {"elevation": None, "girth": 0.3},
-        [0.2, 0.3],
-        0.2,
-        *({"elevation": e, "girth": girth} for e, girth in ((0.2, 0.0), (1e9, 0.3), (0.2, 1e300), (-0.1, 0.3))),
+        *({"elevation": 0.2}, [0.2, 0.3], 0.2),
+        *({"elevation": elevation, "girth": 0.3} for elevation in (None, 1e9, -0.1)),
+        *({"elevation": 0.2, "girth": girth} for girth in (0.0, 1e300)),
     ],
 )
 def test_a_damaged_belt_is_named(tmp_path: Path, belt: object) -> None:

@@ -11,17 +11,12 @@ from playwright.sync_api import Page
 
 from facefolds_core.reporting.build import make_report
 from tests.reporting.tiny import FRAMES, make_subject
+from tests.viewer.conftest import listening
 
 PHONE, DESKTOP = {"width": 390, "height": 844}, {"width": 1280, "height": 900}
 PANELS = [
-    "Truth, asset, error",
-    "Scores",
-    "Cameras",
-    "Textures of one frame",
-    "Training",
-    "What ships",
-    "Time and bytes by stage",
-    "Configuration",
+    *("Truth, asset, error", "Scores", "Cameras", "Textures of one frame"),
+    *("Training", "What ships", "Time and bytes by stage", "Configuration"),
 ]
 
 Open = Callable[..., Page]
@@ -35,20 +30,18 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture
 def open_report(new_page: Callable[..., Page], report: Path) -> Iterator[Open]:
     """Opens the page; fails if it says or fetches anything."""
-    said: list[str] = []
-    requests: list[str] = []
+    noted: list[tuple[list[str], list[str]]] = []
 
     def start(**options: object) -> Page:
         page = new_page(**({"viewport": DESKTOP} | options))
-        page.on("console", lambda message: said.append(message.text))
-        page.on("pageerror", lambda error: said.append(str(error)))
-        page.on("request", lambda request: requests.append(request.url))
+        noted.append(listening(page))
         page.goto(report.as_uri())
         return page
 
     yield start
-    assert said == []
-    assert {url for url in requests if not url.startswith("data:")} == {report.as_uri()}
+    for said, fetched in noted:
+        assert said == []
+        assert {url for url in fetched if not url.startswith("data:")} == {report.as_uri()}
 
 
 @pytest.mark.parametrize("viewport", [PHONE, DESKTOP], ids=["phone", "desktop"])

@@ -11,7 +11,7 @@ from facefolds_core.subject.splats import COLUMNS
 from tests.scenes import look_at_origin
 from tests.subject import reference
 from tests.subject.splats import some_splats
-from tests.threads import on_threads
+from tests.threads import each_of
 
 
 def test_picture_and_gradients_are_those_of_the_reference() -> None:
@@ -54,10 +54,10 @@ def test_nothing_is_black_and_light() -> None:
 
 def test_threads_change_nothing() -> None:
     values, view = some_splats(300), view_of(look_at_origin("one", 20, 10, 64))
-    results = []
-    for threads in (1, numba.config.NUMBA_NUM_THREADS):
-        with on_threads(threads):
-            drawing = draw(values, view)
-            results.append((drawing.rgb, *differentiate(values, drawing, drawing.rgb, drawing.light)))
-    for one, two in zip(*results, strict=True):
+
+    def drawn() -> tuple[np.ndarray, ...]:
+        drawing = draw(values, view)
+        return drawing.rgb, *differentiate(values, drawing, drawing.rgb, drawing.light)
+
+    for one, two in zip(*each_of((1, numba.config.NUMBA_NUM_THREADS), drawn), strict=True):
         np.testing.assert_array_equal(one, two)

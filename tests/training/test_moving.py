@@ -18,6 +18,7 @@ from facefolds_core.training.rays import RaySampler
 from tests.geometry.test_track import about
 from tests.scenes import CENTRE, make_scene
 
+WINDOW = (-0.6, 0.6, -0.6, 0.6)
 STILL = Track.of([np.eye(3)] * 2, np.zeros((2, 3)))
 TURNED = Track.of([np.eye(3), about((0, 0, 1), 15)], [[0, 0, 0], [0.02, 0.01, 0]])
 
@@ -30,7 +31,7 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Scene:
 def layers() -> RadialManifolds:
     """Three spheres' caps around the subject of `make_scene`."""
     middle, halfwidth = torch.full((9, 9), 0.33), torch.full((9, 9), 0.01)
-    return RadialManifolds(Chart((float(CENTRE[0]), 0.0, 0.0)), (-0.6, 0.6, -0.6, 0.6), middle, halfwidth, 3)
+    return RadialManifolds(Chart((float(CENTRE[0]), 0.0, 0.0)), WINDOW, middle, halfwidth, 3)
 
 
 def rays(scene: Scene, stride: int = 1, share: float = 400.0, reserve: float = 0, shares: int = 1000) -> MovingRays:

@@ -27,7 +27,7 @@ from tests.geometry.test_track import about
 from tests.scenes import make_scene
 from tests.training.takes import params
 from tests.training.test_explicit_kernels import random_cut
-from tests.training.test_moving import TURNED, layers, rays
+from tests.training.test_moving import TURNED, WINDOW, layers, rays
 
 
 @pytest.fixture(scope="module")
@@ -38,7 +38,7 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Scene:
 def model() -> RadianceManifolds:
     """Opaque layers that mirror a room which is light to the left alone."""
     reflection = Reflection(ReflectionShape((2, 2), 4))
-    textures = GridTextures((-0.6, 0.6, -0.6, 0.6), (4, 4), 3, 1, reflection)
+    textures = GridTextures(WINDOW, (4, 4), 3, 1, reflection)
     with torch.no_grad():
         textures.layers[..., 3] = 5.0
         reflection.gloss.fill_(0.5)
@@ -72,13 +72,11 @@ def test_the_rays_of_a_fit_are_every_so_many_th_of_all_frames_together(scene: Sc
     source = rays(replace(scene, frame_ids=tuple("abcdef"), poses=turns), share=150)
     state = TextureState((8, 8), 3, 6, torch.full((2, 2, 3), 0.5), params())
     state.layers[0] = 4 * torch.randn(state.layers[0].shape, generator=torch.Generator().manual_seed(0))
-    window = (-0.6, 0.6, -0.6, 0.6)
-    every, some = (
-        GlossFit(layers().chart, window, ReflectionParams(), turns, GlossParams(rays=most, moving_frames=5)).look(
-            state, source, Noise()
-        )
+    fits = [
+        GlossFit(layers().chart, WINDOW, ReflectionParams(), turns, GlossParams(rays=most, moving_frames=5))
         for most in (10**6, 100)
-    )
+    ]
+    every, some = (fit.look(state, source, Noise()) for fit in fits)
     step = -(-len(every.st) // 100)
     assert step > 1 and len({turn.tobytes() for turn in some.turns}) == 5
     for field in fields(Seen):
@@ -90,14 +88,13 @@ def test_steps_are_lit_as_the_head_stands_in_their_frame(scene: Scene) -> None:
     turns = Track.of([about((0, 0, 1), 20.0 * k) for k in range(2)], np.zeros((2, 3)))
     source = rays(replace(scene, frame_ids=tuple("ab"), poses=turns), share=150)
     state = TextureState((8, 8), 3, 2, torch.full((2, 2, 3), 0.5), params())
-    window, rng = (-0.6, 0.6, -0.6, 0.6), np.random.default_rng(0)
     given = ReflectionParams(texels=6, environment_texels=5)
-    gloss = GlossFit(layers().chart, window, given, turns)
+    gloss = GlossFit(layers().chart, WINDOW, given, turns)
     views, _ = source.part(1, 0, 1)
     gloss.light(state, views, 1)
     assert len(state.shine) == 0  # nothing is known yet
-    surface = surface_normals(np.full((20, 20), 0.33), layers().chart, window, (6, 6), 1.0)
-    light = rng.random((5, 5, 3), np.float32)
+    surface = surface_normals(np.full((20, 20), 0.33), layers().chart, WINDOW, (6, 6), 1.0)
+    light = np.random.default_rng(0).random((5, 5, 3), np.float32)
     gloss.maps = replace(Maps.blank(surface, given), environment=light)
     gloss.light(state, views, 1)
     st = (torch.from_numpy(views.codes[:, 1].astype(np.float32)) - 1) / 65534
@@ -124,7 +121,7 @@ def test_nothing_is_fitted_before_anything_is_opaque(scene: Scene) -> None:
     """No gloss would be found then, and without gloss no light ever after."""
     state = TextureState((8, 8), 3, 6, torch.full((2, 2, 3), 0.5), params())
     source = StillRays(trace_views(scene, layers(), 1))
-    gloss = GlossFit(layers().chart, layers().window, ReflectionParams(texels=4, environment_texels=4), None)
+    gloss = GlossFit(layers().chart, WINDOW, ReflectionParams(texels=4, environment_texels=4), None)
     gloss.follow(state, source, Noise(), layers().middle.detach())
     for logit, fitted in ((-5.0, False), (5.0, True)):
         state.layers[0, ..., 3] = logit

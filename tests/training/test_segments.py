@@ -67,17 +67,12 @@ def test_each_frame_is_shown_best_by_its_own_textures(take: tuple[Scene, Path]) 
         assert error_of(scene, folder / "model", k, k) < error_of(scene, folder / "model", k, (k + 2) % FRAMES)
 
 
-def test_the_model_holds_base_and_segments(take: tuple[Scene, Path]) -> None:
+def test_the_model_holds_base_and_segments_and_is_linear_between_frames(take: tuple[Scene, Path]) -> None:
     folder = take[1] / "model"
     assert sorted(p.name for p in (folder / "segments").iterdir()) == [f"{i:05d}.safetensors" for i in range(3)]
     textures = load_model(folder).textures
     assert isinstance(textures, SegmentedTextures) and textures.lengths == (2, 2, 1)
     assert textures.frame_colour.numel() == 0
-
-
-def test_between_frames_it_is_linear_across_segments(take: tuple[Scene, Path]) -> None:
-    textures = load_model(take[1] / "model").textures
-    assert isinstance(textures, SegmentedTextures)
     uv, directions = torch.zeros(2, 2), torch.tensor([[-1.0, 0, 0]] * 2)
     both = textures.shade(uv, torch.zeros(2, dtype=torch.long), torch.tensor([1.5, 4.0]), directions)
     alone = [textures.shade(uv[:1], torch.zeros(1, dtype=torch.long), torch.tensor([t]), None) for t in (1.5, 4.0)]
