@@ -29,6 +29,7 @@ from facefolds_core.subject.ply import write_ply
 from facefolds_core.subject.splats import COLOUR, COLUMNS, MEAN, OPACITY, SCALE, TURN, Splats
 from facefolds_core.subject.storage import Body
 from facefolds_core.subject.sweep import depth_maps
+from tests.geometry.test_track import about
 from tests.scenes import OPAQUE, first_hit, look_at_origin
 from tests.scenes import render as true_picture
 
@@ -47,10 +48,8 @@ def wall(camera):  # type: ignore[no-untyped-def]
 @pytest.fixture(scope="module")
 def scene(tmp_path_factory: pytest.TempPathFactory) -> Scene:
     folder = tmp_path_factory.mktemp("scene")
-    rig = tuple(
-        look_at_origin(f"c{i}", azimuth, 12 * (-1) ** i, SIZE)
-        for i, azimuth in enumerate(np.linspace(-40, 40, CAMERAS))
-    )
+    azimuths = np.linspace(-40, 40, CAMERAS)
+    rig = tuple(look_at_origin(f"c{i}", azimuth, 12 * (-1) ** i, SIZE) for i, azimuth in enumerate(azimuths))
     scene = Scene(
         "ball", rig, tuple("holdout" if i == HELD else "train" for i in range(CAMERAS)), ("0",), np.zeros(1), 0.0,
         Similarity(2.0, rotation(np.array([0.8, 0.0, 0.6, 0.0])), np.array([0.1, 0.2, 0.3])), (), folder,
@@ -69,6 +68,12 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Scene:
 @pytest.fixture(scope="module")
 def splats(scene: Scene) -> Splats:
     return fit_room(scene, 0, PARAMS)
+
+
+def silhouette(scene: Scene) -> np.ndarray:
+    masks = scene.open_masks()
+    assert masks is not None
+    return masks.image(HELD, 0)[..., 0] > 127
 
 
 def psnr(picture: np.ndarray, truth: np.ndarray) -> float:
@@ -110,16 +115,12 @@ def test_subject_mattes_and_what_stands_behind(scene: Scene, splats: Splats) -> 
     assert 0.1 < subject.mean() < 0.95
     body = body_among(scene, splats, 0)
     assert (body.subject <= (np.linalg.norm(splats.means, axis=1) < 0.45)).all()
-    masks = scene.open_masks()
-    assert masks is not None
-    true = masks.image(HELD, 0)[..., 0] > 127
+    true = silhouette(scene)
     found = Mattes(scene, body=body).of((HELD, 0))
-    matte = found.opacity > 127
     assert found.source == "picture" and found.agreement is not None and found.agreement > 0.7
-    assert (matte & true).sum() / (matte | true).sum() > 0.9
+    assert agreement(found.opacity > 127, true) > 0.9
     behind = background(splats, subject, scene.cameras[HELD])
-    beside = ~true
-    assert np.abs(behind - wall(scene.cameras[HELD]))[beside].mean() < 0.12
+    assert np.abs(behind - wall(scene.cameras[HELD]))[~true].mean() < 0.12
 
 
 def test_what_hangs_behind_the_subject_and_is_hidden_by_it_is_none_of_it(scene: Scene, splats: Splats) -> None:
@@ -171,9 +172,7 @@ def test_a_picture_that_contradicts_the_first_fit_is_asked_of_the_subject_alone(
     scene: Scene, splats: Splats, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(mattes_module, "ASKED", 1.01)  # none agrees
-    masks = scene.open_masks()
-    assert masks is not None
-    true = masks.image(HELD, 0)[..., 0] > 127
+    true = silhouette(scene)
     mattes = Mattes(scene, body=body_among(scene, splats, 0))
     before, (colours, opacities) = mattes.of((HELD, 0)), cut_outs(scene)
     mattes.alone = fit_pictures(scene.cameras, colours, PARAMS, 0, opacities)
@@ -202,10 +201,8 @@ def cut_outs(scene: Scene) -> tuple[list[np.ndarray], list[np.ndarray]]:
 
 def test_of_a_subject_that_is_cut_out_nothing_else_is_explained(scene: Scene) -> None:
     colours, opacities = cut_outs(scene)
-    kept = [i for i in range(CAMERAS) if i != HELD]
-    found = fit_pictures(
-        [scene.cameras[i] for i in kept], [colours[i] for i in kept], PARAMS, 0, [opacities[i] for i in kept]
-    )
+    seen, shown, covered = ([*all_of[:HELD], *all_of[HELD + 1 :]] for all_of in (scene.cameras, colours, opacities))
+    found = fit_pictures(seen, shown, PARAMS, 0, covered)
     assert not found.background.any()
     rgb, alpha, _ = render(found, scene.cameras[HELD])
     assert np.abs(alpha - opacities[HELD]).mean() < 0.05
@@ -251,23 +248,15 @@ def test_where_too_few_others_look_nothing_is_contradicted(scene: Scene) -> None
 
 
 def test_a_file_of_another_program(scene: Scene, splats: Splats, tmp_path: Path) -> None:
+    """Of a head that turns it is brought into the head's own frame."""
     opaque = Splats(splats.values, np.zeros(3, np.float32))
     write_ply(tmp_path / "a.ply", moved(opaque, scene.from_capture.inverse()))
     found = read_start(tmp_path / "a.ply", scene)
     for camera in scene.cameras[:2]:
         np.testing.assert_allclose(render(found, camera)[0], render(opaque, camera)[0], atol=5e-3)
+    turned = replace(scene, poses=Track.of([about((0, 0, 1), 11.5)], [[0.02, 0.05, 0]]))
+    seen = render(read_start(tmp_path / "a.ply", turned), turned.camera_in_head(0, 0))[0]
+    np.testing.assert_allclose(seen, render(opaque, scene.cameras[0])[0], atol=5e-3)
     write_ply(tmp_path / "b.ply", opaque)  # in the scene's coordinates, not in the capture's
     with pytest.raises(UserError, match="do not show"):
         read_start(tmp_path / "b.ply", scene)
-
-
-def test_a_file_of_another_program_is_brought_into_a_turning_heads_own_frame(
-    scene: Scene, splats: Splats, tmp_path: Path
-) -> None:
-    c, s = np.cos(0.2), np.sin(0.2)
-    turn = Track.of([[[c, -s, 0], [s, c, 0], [0, 0, 1]]], [[0.02, 0.05, 0]])
-    opaque, turned = Splats(splats.values, np.zeros(3, np.float32)), replace(scene, poses=turn)
-    write_ply(tmp_path / "a.ply", moved(opaque, scene.from_capture.inverse()))
-    found = read_start(tmp_path / "a.ply", turned)
-    seen = render(found, turned.camera_in_head(0, 0))[0]
-    np.testing.assert_allclose(seen, render(opaque, scene.cameras[0])[0], atol=5e-3)

@@ -13,25 +13,24 @@ from PIL import Image
 
 from tests.viewer.conftest import NO_WEBCODECS, NewPlayer, Player, element, page_of_yours
 
-
-def numbers(player: Player, expression: str) -> list[float]:
-    return player.run(f"return {expression}")
-
-
 VIEW = "[e.state.view.azimuth, e.state.view.elevation, e.state.view.distance]"
+
+
+def numbers(player: Player, expression: str = VIEW) -> list[float]:
+    return player.run(f"return {expression}")
 
 
 def test_camera_orbit_is_the_first_view(new_player: NewPlayer, rich: Path) -> None:
     plain = element(new_player, rich)
-    away = numbers(plain, VIEW)[2]
+    away = numbers(plain)[2]
     player = element(new_player, rich, 'camera-orbit="30deg 80deg 120%"')
-    assert numbers(player, VIEW) == pytest.approx([30, 10, 1.2 * away])
+    assert numbers(player) == pytest.approx([30, 10, 1.2 * away])
     player.run("e.state = {view: {azimuth: -20}}; e.resetView()")
-    assert numbers(player, VIEW)[0] == pytest.approx(30)
+    assert numbers(player)[0] == pytest.approx(30)
     player.run("e.setAttribute('camera-orbit', '-15deg auto 1.5m')")
-    assert numbers(player, VIEW) == pytest.approx([-15, 0, 1.5])
+    assert numbers(player) == pytest.approx([-15, 0, 1.5])
     player.run("e.removeAttribute('camera-orbit')")
-    assert numbers(player, VIEW) == pytest.approx([0, 0, away])
+    assert numbers(player) == pytest.approx([0, 0, away])
 
 
 def test_camera_target_is_what_the_first_view_looks_at(new_player: NewPlayer, rich: Path) -> None:
@@ -48,17 +47,17 @@ def test_camera_target_is_what_the_first_view_looks_at(new_player: NewPlayer, ri
 def test_a_page_bounds_the_view(new_player: NewPlayer, rich: Path) -> None:
     least, most = "-10deg 75deg 80%", "20deg 95deg 1.5m"
     player = element(new_player, rich, f'min-camera-orbit="{least}" max-camera-orbit="{most}"')
-    away = numbers(player, VIEW)[2]
+    away = numbers(player)[2]
     for asked, found in (((90, 60, 0.01), (20, 15, 0.8 * away)), ((-90, -60, 9), (-10, -5, 1.5))):
         view = dict(zip(("azimuth", "elevation", "distance"), asked, strict=True))
         player.run("e.state = {view: v}", view)
-        assert numbers(player, VIEW) == pytest.approx(found)
+        assert numbers(player) == pytest.approx(found)
     drag(player, -300, -200)
     assert numbers(player, "[e.player.view.goal.azimuth, e.player.view.goal.elevation]") == [20, -5]
     drag(player, 20, 0)  # at once: what was beyond the end is forgotten
     assert numbers(player, "[e.player.view.goal.azimuth]")[0] < 10
     player.run("e.minCameraOrbit = 'auto'; e.maxCameraOrbit = '30deg auto auto'; e.state = {view: {azimuth: 90}}")
-    assert numbers(player, VIEW)[0] == pytest.approx(30)
+    assert numbers(player)[0] == pytest.approx(30)
 
 
 def drag(player: Player, dx: float, dy: float, button: Literal["left", "right"] = "left") -> None:
@@ -104,33 +103,30 @@ def test_a_page_says_when_it_is_revealed(new_player: NewPlayer, rich: Path) -> N
 
 def test_a_narrower_field_of_view_shows_the_same_from_further_away(new_player: NewPlayer, rich: Path) -> None:
     player = element(new_player, rich, 'background="#00ff00" controls="none"')
-    before, away = player.capture(), numbers(player, VIEW)[2]
+    before, away = player.capture(), numbers(player)[2]
     player.run("e.setAttribute('field-of-view', '12deg')")
     after = player.capture()
-    assert numbers(player, VIEW)[2] > 2 * away
+    assert numbers(player)[2] > 2 * away
     widths = [np.flatnonzero((np.abs(one[..., :3] - (0, 1, 0)).max(-1) > 0.1).any(0)) for one in (before, after)]
     assert np.ptp(widths[1]) == pytest.approx(np.ptp(widths[0]), rel=0.15)
 
 
 def test_camera_controls_and_zoom_can_be_switched_off(new_player: NewPlayer, rich: Path) -> None:
     player = element(new_player, rich, "disable-zoom")
-    before = numbers(player, VIEW)
+    before = numbers(player)
     player.page.mouse.click(200, 100)
     player.page.mouse.wheel(0, -300)
     player.page.keyboard.press("+")
     player.page.wait_for_timeout(300)
-    assert numbers(player, VIEW) == before
+    assert numbers(player) == before
     player.page.keyboard.press("Shift+ArrowRight")
-    assert numbers(player, VIEW)[0] == pytest.approx(before[0] + 5)
+    assert numbers(player)[0] == pytest.approx(before[0] + 5)
     player.run("e.removeAttribute('disable-zoom'); e.setAttribute('camera-controls', 'none'); e.resetView()")
-    player.page.mouse.move(200, 100)
-    player.page.mouse.down()
-    player.page.mouse.move(100, 100, steps=4)
-    player.page.mouse.up()
+    drag(player, -100, 0)
     for key in ("Shift+ArrowRight", "+"):
         player.page.locator("[data-do=play]").press(key)
     player.page.wait_for_timeout(300)
-    assert numbers(player, VIEW) == before
+    assert numbers(player) == before
 
 
 def test_it_turns_by_itself_and_again_after_a_touch(new_player: NewPlayer, rich: Path) -> None:
@@ -151,13 +147,9 @@ def test_with_reduced_motion_it_does_not_turn(new_player: NewPlayer, rich: Path)
     assert player.run("return e.player.view.swaying") == 0
 
 
-def test_a_prompt_for_who_does_nothing(new_player: NewPlayer, rich: Path) -> None:
-    player = element(new_player, rich, 'interaction-prompt="auto"')
+def test_alt_names_the_picture_and_who_does_nothing_is_prompted(new_player: NewPlayer, rich: Path) -> None:
+    player = element(new_player, rich, 'alt="Ann, who laughs" interaction-prompt="auto"')
     assert player.notice() == "Drag to turn"
-
-
-def test_alt_names_the_picture(new_player: NewPlayer, rich: Path) -> None:
-    player = element(new_player, rich, 'alt="Ann, who laughs"')
     player.page.get_by_role("img", name="Ann, who laughs").wait_for()
     player.run("e.removeAttribute('alt')")
     player.page.get_by_role("img", name="Three-dimensional picture").wait_for()
@@ -202,7 +194,7 @@ def test_a_page_may_open_with_the_photo(new_player: NewPlayer, rich: Path) -> No
     assert player.page.get_by_role("slider", name="Border between asset and photo").is_visible()
 
 
-def test_a_picture_of_what_is_seen(new_player: NewPlayer, rich: Path) -> None:
+def test_a_picture_of_what_is_seen_and_parts_that_are_styled(new_player: NewPlayer, rich: Path) -> None:
     player = element(new_player, rich)
     code = """const blob = await e.toBlob(v); const bytes = new Uint8Array(await blob.arrayBuffer());
         return [blob.type, btoa(String.fromCharCode(...bytes))];"""
@@ -212,10 +204,6 @@ def test_a_picture_of_what_is_seen(new_player: NewPlayer, rich: Path) -> None:
         picture = np.asarray(Image.open(io.BytesIO(base64.b64decode(data))).convert("RGB")) / 255
         assert np.abs(picture - player.capture()[..., :3]).mean() < 0.02
 
-
-def test_parts_can_be_styled(new_player: NewPlayer, rich: Path) -> None:
-    player = element(new_player, rich)
     player.run("const sheet = new CSSStyleSheet(); document.adoptedStyleSheets.push(sheet);"
                "sheet.replaceSync('facefolds-player::part(bar) { border-radius: 3px }')")  # fmt: skip
-    style = "getComputedStyle(e.shadowRoot.querySelector('.bar')).borderRadius"
-    assert player.run(f"return {style}") == "3px"
+    assert player.run("return getComputedStyle(e.shadowRoot.querySelector('.bar')).borderRadius") == "3px"

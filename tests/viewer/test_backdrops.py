@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tests.viewer.conftest import NewPlayer, Player, page_of_yours
+from tests.viewer.conftest import NewPlayer, Player, element
 
 WIDTH, HEIGHT = 320, 240
 INNER, OUTER = np.array([0x4A, 0x50, 0x5E]), np.array([0x0E, 0x10, 0x14])
@@ -17,11 +17,7 @@ INNER, OUTER = np.array([0x4A, 0x50, 0x5E]), np.array([0x0E, 0x10, 0x14])
 
 @pytest.fixture
 def player(new_player: NewPlayer, rich: Path) -> Player:
-    player = new_player({"asset": rich}, viewport={"width": WIDTH, "height": HEIGHT})
-    style = f"width: {WIDTH}px; height: {HEIGHT}px"
-    page_of_yours(player, f'<facefolds-player src="asset/" controls="none" style="{style}"></facefolds-player>')
-    player.wait("e.level === 'full'")
-    return player
+    return element(new_player, rich, 'controls="none"', size=(WIDTH, HEIGHT))
 
 
 def studio() -> NDArray[np.float64]:
@@ -77,8 +73,5 @@ def test_a_backdrop_brings_its_shadow_and_a_colour_none(player: Player) -> None:
     assert player.run(f"e.background = 'clay'; {seen}") == pytest.approx(0.55)
     assert player.run(f"e.background = 'white'; {seen}") == 0
     assert player.run(f"e.setAttribute('shadow-intensity', '7'); {seen}") == 1
-
-
-def test_a_name_that_is_none_is_refused(player: Player) -> None:
     words = player.run("try { e.background = 'stage' } catch (error) { return error.message }")
-    assert words == 'a background is a colour of CSS or studio, daylight, clay, not "stage"'
+    assert "studio, daylight, clay" in words and '"stage"' in words

@@ -28,7 +28,7 @@ def test_the_page_is_measured_over_a_slow_line(browser: Browser, serve: Serve, r
 
 
 def test_five_views_agree_with_the_command_render(browser: Browser, serve: Serve, tmp_path: Path) -> None:
-    make_asset(tmp_path / "asset", layers=5, frames=2, resolution=256)
-    add_reflection(tmp_path / "asset")
-    found = agreement(browser, serve({"asset": tmp_path / "asset"}), tmp_path / "asset")
+    asset = make_asset(tmp_path / "asset", layers=5, frames=2, resolution=256).folder
+    add_reflection(asset)
+    found = agreement(browser, serve({"asset": asset}), asset)
     assert len(found) == 5 and min(found.values()) >= AGREE, found

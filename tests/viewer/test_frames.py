@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
 
@@ -11,7 +12,7 @@ import pytest
 from facefolds_core.asset import read_asset
 from tests.assets import make_asset
 from tests.pictures import GREY, five_cameras, means_of_frames, psnr
-from tests.viewer.conftest import NO_WEBCODECS, NewPlayer, Player
+from tests.viewer.conftest import NO_WEBCODECS, Player, Show
 from tests.viewer.fixtures import change_manifest
 
 CAMERA = five_cameras(64)[0]
@@ -24,10 +25,16 @@ def pictures(rich: Path) -> list[np.ndarray]:
     return means_of_frames(read_asset(rich), CAMERA)
 
 
-def opened(player: Player) -> Player:
-    player.open("asset", full=True)
-    player.run("e.background = v; e.effects = false", GREY)
-    return player
+@pytest.fixture
+def opened(show: Show) -> Callable[..., Player]:
+    """On grey, without the reflection."""
+
+    def of(**options: object) -> Player:
+        player = show(full=True, **options)
+        player.run("e.background = v; e.effects = false", GREY)
+        return player
+
+    return of
 
 
 def nearest(player: Player, pictures: list[np.ndarray]) -> int:
@@ -41,9 +48,9 @@ def nearest(player: Player, pictures: list[np.ndarray]) -> int:
 
 @DECODERS
 def test_every_seek_shows_the_frame_asked_for(
-    new_player: NewPlayer, rich: Path, pictures: list[np.ndarray], script: str
+    opened: Callable[..., Player], pictures: list[np.ndarray], script: str
 ) -> None:
-    player = opened(new_player({"asset": rich}, script=script))
+    player = opened(script=script)
     for frame in (5, 0, 3, 2, 4, 1, 5, 5):
         assert player.run("return await e.seek(v)", frame)
         assert player.run("return e.frame") == frame
@@ -52,7 +59,7 @@ def test_every_seek_shows_the_frame_asked_for(
 
 @pytest.mark.parametrize("codec", ["vp9", "av1"])
 def test_the_other_videos_have_the_same_frames(
-    new_player: NewPlayer, pictures: list[np.ndarray], rich_copy: Path, codec: str
+    opened: Callable[..., Player], pictures: list[np.ndarray], rich_copy: Path, codec: str
 ) -> None:
     """The videos before it are of a codec that no browser knows: the next one plays."""
 
@@ -62,24 +69,24 @@ def test_the_other_videos_have_the_same_frames(
                 video["mime"] = 'video/mp4; codecs="hvc9.1.6.L93.B0"'
 
     change_manifest(rich_copy, change)
-    player = opened(new_player({"asset": rich_copy}))
+    player = opened(asset=rich_copy)
     assert player.run("return e.statistics.video") == codec
     for frame in (5, 2, 0, 3):
         player.run("await e.seek(v)", frame)
         assert nearest(player, pictures) == frame
 
 
-def test_of_many_seeks_the_last_wins(new_player: NewPlayer, rich: Path, pictures: list[np.ndarray]) -> None:
-    player = opened(new_player({"asset": rich}))
+def test_of_many_seeks_the_last_wins(opened: Callable[..., Player], pictures: list[np.ndarray]) -> None:
+    player = opened()
     done = player.run("const all = [5, 1, 4, 2, 3].map((k) => e.seek(k)); return Promise.all(all)")
     assert done[-1] is True
     assert nearest(player, pictures) == 3
 
 
 @DECODERS
-def test_playing_goes_round_without_a_gap(new_player: NewPlayer, rich: Path, script: str) -> None:
+def test_playing_goes_round_without_a_gap(opened: Callable[..., Player], script: str) -> None:
     """Frames come in order and wrap round; slowly enough that software rendering need not leave any out."""
-    player = opened(new_player({"asset": rich}, script=script))
+    player = opened(script=script)
     frames = player.run(
         """const seen = [];
         e.addEventListener('frame', () => seen.push(e.frame));
@@ -94,10 +101,10 @@ def test_playing_goes_round_without_a_gap(new_player: NewPlayer, rich: Path, scr
 
 
 def test_while_playing_the_picture_is_that_of_the_frame_named(
-    new_player: NewPlayer, rich: Path, pictures: list[np.ndarray]
+    opened: Callable[..., Player], pictures: list[np.ndarray]
 ) -> None:
     """Colour and alpha come from one frame, and `frame` says which; looked at in the middle of playing."""
-    player = opened(new_player({"asset": rich}))
+    player = opened()
     player.run("e.speed = 0.1; e.play()")
     for _ in range(4):
         player.page.wait_for_timeout(170)
@@ -106,28 +113,23 @@ def test_while_playing_the_picture_is_that_of_the_frame_named(
         player.run("e.player.playback.speed = 0.1")
 
 
-def test_without_loop_it_stops_at_the_end_and_starts_again(new_player: NewPlayer, rich: Path) -> None:
-    player = opened(new_player({"asset": rich}))
+def test_without_loop_it_stops_at_the_end_and_starts_again(show: Show) -> None:
+    player = show(full=True)
     player.run("e.loop = false; await e.seek(3); e.play()")
     player.wait("!e.playing && e.frame === 5")
     player.run("e.speed = 0.1; e.play()")
     player.wait("e.playing && e.frame < 4")
-
-
-def test_a_last_frame_that_is_decoded_late_is_shown(new_player: NewPlayer, rich: Path) -> None:
-    player = opened(new_player({"asset": rich}))
+    # A last frame that is decoded late is shown.
     player.run(
         """const { source } = e.player.level; const peek = source.peek.bind(source);
-        e.loop = false; e.speed = 100; await e.seek(3);
+        e.pause(); e.speed = 100; await e.seek(3);
         source.peek = (k) => (k === 5 && !e.playing ? ((source.peek = peek), null) : peek(k));
         e.play();"""
     )
     player.wait("!e.playing && e.frame === 5")
 
 
-def test_a_still_asset_has_one_frame(new_player: NewPlayer, tmp_path: Path) -> None:
-    make_asset(tmp_path / "asset", layers=1, frames=1, resolution=32)
-    player = new_player({"asset": tmp_path / "asset"})
-    player.open("asset", "")
+def test_a_still_asset_has_one_frame(show: Show, tmp_path: Path) -> None:
+    player = show("", asset=make_asset(tmp_path / "asset", layers=1, frames=1, resolution=32).folder)
     assert player.run("return [e.frame, e.frames]") == [0, 1]
     assert player.page.get_by_role("button", name="Play").is_disabled()

@@ -29,8 +29,7 @@ AGREE = 42.0
 
 @pytest.fixture(scope="module")
 def asset(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("poster") / "asset"
-    make_asset(folder, layers=3, frames=2, resolution=96)
+    folder = make_asset(tmp_path_factory.mktemp("poster") / "asset", layers=3, frames=2, resolution=96).folder
     add_reflection(folder)
     made = read_asset(folder)
     camera = write_poster(folder / "poster.jpg", made, made.manifest.bounds, 640)
@@ -86,10 +85,12 @@ def test_a_poster_that_shows_something_else_is_not_shown(new_player: NewPlayer, 
 
 
 def test_both_know_of_the_same_camera_and_colour(project_root: Path) -> None:
-    source = project_root / "viewer" / "src"
-    view = (source / "view.js").read_text()
-    attributes = (source / "attributes.js").read_text()
-    assert float(re.search(r"FIELD_OF_VIEW = ([\d.]+)", attributes)[1]) == FIELD_OF_VIEW
-    assert float(re.search(r"FILLED = ([\d.]+)", view)[1]) == FILLED
-    colour = re.search(r'BACKGROUND = "#(\w{6})"', (source / "element.js").read_text())
-    assert colour is not None and tuple(round(255 * value) for value in BACKGROUND) == tuple(bytes.fromhex(colour[1]))
+    def said(file: str, pattern: str) -> str:
+        found = re.search(pattern, (project_root / "viewer" / "src" / file).read_text())
+        assert found is not None, pattern
+        return found[1]
+
+    assert float(said("attributes.js", r"FIELD_OF_VIEW = ([\d.]+)")) == FIELD_OF_VIEW
+    assert float(said("view.js", r"FILLED = ([\d.]+)")) == FILLED
+    colour = bytes.fromhex(said("element.js", r'BACKGROUND = "#(\w{6})"'))
+    assert [round(255 * value) for value in BACKGROUND] == list(colour)

@@ -56,8 +56,7 @@ def test_a_hotspot_stands_at_its_place_from_every_side(new_player: NewPlayer, ri
 
 def test_a_hotspot_follows_a_head_that_moves(new_player: NewPlayer, tmp_path: Path) -> None:
     """From frame to frame, as it plays, and back to rest where the head is held still."""
-    asset = tmp_path / "asset"
-    make_asset(asset, layers=3, frames=3, resolution=64, source=MOVING)
+    asset = make_asset(tmp_path / "asset", layers=3, frames=3, resolution=64, source=MOVING).folder
     player = element(new_player, asset, f'{BARE} loop="false"', HOTSPOT)
     point = point_of(asset)
     places = [place_of(player, TRACK.at(frame).apply(point)) for frame in range(3)]
@@ -82,13 +81,10 @@ def test_a_place_that_is_turned_away_says_so(new_player: NewPlayer, rich: Path) 
 
 def test_the_surface_under_a_point_gives_a_hotspot_there(new_player: NewPlayer, rich: Path) -> None:
     player = element(new_player, rich, BARE, HOTSPOT)
-    surface = player.run(
-        "return e.surfaceFromPoint(e.getBoundingClientRect().x + 210, e.getBoundingClientRect().y + 130)"
-    )
+    surface = player.run("const { x, y } = e.getBoundingClientRect(); return e.surfaceFromPoint(x + 210, y + 130)")
     assert isinstance(surface, str) and len(surface.split()) == 3
-    player.run(
-        "document.querySelector('#spot').dataset.surface = v; await new Promise((r) => setTimeout(r, 200))", surface
-    )
+    moved = "document.querySelector('#spot').dataset.surface = v; await new Promise((r) => setTimeout(r, 200))"
+    player.run(moved, surface)
     assert player.run(SPOT) == pytest.approx([210, 130], abs=1)
     assert player.run("return e.surfaceFromPoint(1, 1)") is None
 
