@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from tests.assets import PLAIN, SOURCE, cap_mesh, cap_texture, write_asset, write_store
-from tests.viewer.conftest import NewPlayer, Player, Show
+from tests.scenes import look_at_origin, view_of
+from tests.viewer.conftest import Player, Show
 from tests.viewer.fixtures import change_manifest
 
 FILMED = {"azimuth": [-30, 40], "elevation": [-10, 20]}
@@ -17,11 +18,9 @@ GOOD = {"azimuth": (-23, 33), "elevation": (-7, 17)}
 
 
 @pytest.fixture
-def player(new_player: NewPlayer, rich_copy: Path) -> Player:
+def player(show: Show, rich_copy: Path) -> Player:
     change_manifest(rich_copy, lambda value: value.update(view=FILMED))
-    player = new_player({"asset": rich_copy}, viewport={"width": 760, "height": 500})
-    player.open("asset", full=True)
-    return player
+    return show(full=True, asset=rich_copy, viewport={"width": 760, "height": 500})
 
 
 def test_a_drag_beyond_what_is_good_meets_resistance_fades_and_comes_back(player: Player) -> None:
@@ -39,19 +38,13 @@ def test_a_drag_beyond_what_is_good_meets_resistance_fades_and_comes_back(player
     player.wait(f"e.player.view.strength === 1 && e.player.view.get().azimuth < {GOOD['azimuth'][1] + 0.1}")
 
 
-def test_a_link_beyond_what_is_good_shows_the_nearest_that_is(player: Player) -> None:
-    player.run("e.state = { view: { azimuth: 170, elevation: 60, distance: 1, target: [0, 0, 0] } }")
-    view = player.run("return e.player.view.get()")
-    assert [view["azimuth"], view["elevation"]] == pytest.approx([GOOD["azimuth"][1], GOOD["elevation"][1]])
-
-
-def test_what_was_measured_bounds_the_view(new_player: NewPlayer, rich_copy: Path) -> None:
-    good = {"azimuth": [-29, 43], "elevation": [-4, 12]}
-    change_manifest(rich_copy, lambda value: value.update(view={**FILMED, "good": good}))
-    player = new_player({"asset": rich_copy})
-    player.open("asset")
-    view = player.run("e.state = { view: { azimuth: -80, elevation: 60 } }; return e.player.view.get()")
-    assert [view["azimuth"], view["elevation"]] == pytest.approx([-29, 12])
+@pytest.mark.parametrize("good", [None, {"azimuth": [-29, 43], "elevation": [-4, 12]}], ids=["filmed", "measured"])
+def test_a_link_beyond_what_is_good_shows_the_nearest_that_is(show: Show, rich_copy: Path, good: dict | None) -> None:
+    change_manifest(rich_copy, lambda value: value.update(view=FILMED | ({"good": good} if good else {})))
+    player, bounds = show(asset=rich_copy), good or GOOD
+    for azimuth, end in ((170, 1), (-80, 0)):
+        view = player.run("e.state = { view: { azimuth: v, elevation: 60 } }; return e.player.view.get()", azimuth)
+        assert [view["azimuth"], view["elevation"]] == pytest.approx([bounds["azimuth"][end], bounds["elevation"][1]])
 
 
 def opaque_all_round(folder: Path) -> Path:
@@ -76,21 +69,15 @@ def dissolved(player: Player, azimuth: float, elevation: float) -> np.ndarray:
     return whole - limited
 
 
-@pytest.fixture
-def round_player(new_player: NewPlayer, tmp_path: Path) -> Player:
-    player = new_player({"asset": opaque_all_round(tmp_path / "asset")}, viewport={"width": 400, "height": 300})
-    player.open("asset")
-    player.run("e.background = 'transparent'")
-    return player
-
-
-def test_hems_fade_beyond_what_is_good_and_nothing_does_within(round_player: Player) -> None:
+def test_hems_fade_beyond_what_is_good_and_nothing_does_within(show: Show, tmp_path: Path) -> None:
     """Too far round, the far side (right) dissolves and the near one stays; from above the back does, not the front."""
+    player = show(asset=opaque_all_round(tmp_path / "asset"), viewport={"width": 400, "height": 300})
+    player.run("e.background = 'transparent'")
     for azimuth, elevation in ((-30, 0), (40, 0), (0, 20), (0, -10)):
-        assert np.abs(dissolved(round_player, azimuth, elevation)).max() == 0, (azimuth, elevation)
-    beside = dissolved(round_player, 44.5, 0)
+        assert np.abs(dissolved(player, azimuth, elevation)).max() == 0, (azimuth, elevation)
+    beside = dissolved(player, 44.5, 0)
     assert beside.min() == 0 and beside[:, 200:].max() > 0.5 and beside[:, :200].max() == 0
-    above = dissolved(round_player, 0, 60)
+    above = dissolved(player, 0, 60)
     assert above.min() == 0 and above[:150].max() > 0.5 and above[150:].max() == 0
 
 
@@ -116,10 +103,7 @@ def test_zoom_ends_where_detail_ends(player: Player) -> None:
 
 
 def test_an_exact_camera_is_never_bounded(player: Player) -> None:
-    player.run(
-        "e.setCamera({K: [[100, 0, 32], [0, 100, 32], [0, 0, 1]], width: 64, height: 64,"
-        "w2c: [[0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 1]]})"
-    )
+    player.run("e.setCamera(v)", view_of(look_at_origin("behind", 180, 0, 64)))
     assert player.run("return e.player.view.strength") == 1
 
 
@@ -136,24 +120,20 @@ def test_the_head_stands_above_the_bar_at_every_size(player: Player) -> None:
         player.page.set_viewport_size({"width": width, "height": height})
         player.wait(f"e.player.size[0] === {width} && e.player.size[1] === {height}")
         player.page.wait_for_timeout(100)
-        bar = player.page.locator(".bar").bounding_box()
-        assert bar
+        top = player.box(".bar")["y"]
         high, low = lowest_and_highest(player)
-        assert 0 < high < low <= bar["y"] + 1, (width, height)
-        assert low - high > 0.3 * min(width, bar["y"]), (width, height)
+        assert 0 < high < low <= top + 1, (width, height)
+        assert low - high > 0.3 * min(width, top), (width, height)
 
 
 def test_the_sheet_of_a_phone_leaves_the_face_in_sight(player: Player) -> None:
     player.page.set_viewport_size({"width": 390, "height": 700})
     player.wait("e.player.size[0] === 390")
     player.button("Settings")
-    panel = player.page.locator(".panel")
-    panel.wait_for()
+    player.page.locator(".panel").wait_for()
     player.page.wait_for_timeout(200)
-    box = panel.bounding_box()
-    assert box
     high, low = lowest_and_highest(player)
-    assert 0 < high < low <= box["y"] + 1
+    assert 0 < high < low <= player.box(".panel")["y"] + 1
 
 
 def test_a_view_that_somebody_chose_stays_when_the_size_changes(player: Player) -> None:

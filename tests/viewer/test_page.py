@@ -84,14 +84,6 @@ def test_an_element_can_change_its_source_and_go(new_player: NewPlayer, rich: Pa
     assert player.run("const p = e.player; e.remove(); await 0; return [e.player, p.closed]") == [None, True]
 
 
-def test_a_phone_shows_all_its_buttons(show: Show) -> None:
-    player = show(viewport={"width": 360, "height": 640})
-    player.wait("e.player.sound !== null")
-    boxes = [button.bounding_box() for button in player.page.locator(".bar button:visible").all()]
-    assert len(boxes) >= 8
-    assert all(box and box["x"] >= 0 and box["x"] + box["width"] <= 360 for box in boxes)
-
-
 def test_little_script_before_the_first_picture(show: Show, player_folder: Path) -> None:
     """All that is fetched until there is a picture, compressed as servers do."""
     player = show()

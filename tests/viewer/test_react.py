@@ -8,7 +8,7 @@ import re
 import subprocess
 from pathlib import Path
 
-from tests.viewer.conftest import NewPlayer
+from tests.viewer.conftest import NewPlayer, page_of_yours
 
 PAGE = """
 import { createElement, createRef } from "react";
@@ -52,10 +52,7 @@ def test_the_guides_component_compiles_and_plays(
     page = player.page
     page.route("**/page.js", lambda route: route.fulfill(path=tmp_path / "page.js", content_type="text/javascript"))
     page.route("**/player/**", lambda route: route.continue_(url=route.request.url.replace("/player/", "/")))
-    html = '<!doctype html><link rel="icon" href="data:,"><div id="root"></div>'
-    html += '<script type="module" src="page.js"></script>'
-    page.route("**/yours.html", lambda route: route.fulfill(body=html, content_type="text/html"))
-    page.goto(f"{player.address}yours.html")
+    page_of_yours(player, '<div id="root"></div>', "page.js")
     player.wait("e?.ready && e.frame === 2")
     page.evaluate("show(4)")
     player.wait("e.frame === 4")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import shutil
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -16,8 +17,10 @@ from facefolds_core.asset import read_asset
 from tests.pictures import GREY, five_cameras, means_of_frames, psnr
 from tests.scenes import view_of
 from tests.streamed import streamed_asset
-from tests.viewer.conftest import NO_WEBCODECS, NewPlayer, Player
+from tests.viewer.conftest import NO_WEBCODECS, NewPlayer, Player, Show
+from tests.viewer.fixtures import flipped
 
+Opened = Callable[..., Player]
 CAMERA = five_cameras(48)[0]
 DECODERS = pytest.mark.parametrize("script", ["", NO_WEBCODECS], ids=["WebCodecs", "hls.js"])
 FRAMES = 46
@@ -57,17 +60,23 @@ def shows(picture: np.ndarray, pictures: list[np.ndarray], frame: int) -> bool:
     return abs((0.4 * (best - frame) + np.pi) % (2 * np.pi) - np.pi) < 0.15
 
 
-def opened(player: Player) -> Player:
-    player.open("asset", full=True)
-    player.run("e.background = v", GREY)
-    return player
+@pytest.fixture
+def opened(show: Show) -> Callable[..., Player]:
+    """On grey, at its full level."""
+
+    def of(asset: Path, **options: object) -> Player:
+        player = show(full=True, asset=asset, **options)
+        player.run("e.background = v", GREY)
+        return player
+
+    return of
 
 
 @DECODERS
 def test_every_seek_shows_the_frame_asked_for(
-    new_player: NewPlayer, take: Path, pictures: dict[str, list[np.ndarray]], script: str
+    opened: Opened, take: Path, pictures: dict[str, list[np.ndarray]], script: str
 ) -> None:
-    player = opened(new_player({"asset": take}, script=script))
+    player = opened(take, script=script)
     for frame in (FRAMES - 1, 0, 18, 17, 35, 36, 13):
         assert player.run("return await e.seek(v)", frame)
         assert shows(player.capture(CAMERA)[..., :3], pictures["full"], frame)
@@ -95,10 +104,8 @@ RECORD = """
     return seen;"""
 
 
-def test_no_wrong_frame_while_levels_change(
-    new_player: NewPlayer, take: Path, pictures: dict[str, list[np.ndarray]]
-) -> None:
-    player = opened(new_player({"asset": take}))
+def test_no_wrong_frame_while_levels_change(opened: Opened, take: Path, pictures: dict[str, list[np.ndarray]]) -> None:
+    player = opened(take)
     seen = player.run(RECORD, view_of(CAMERA))
     assert {level for _, level, _ in seen} == {"small", "full"} and len(seen) > 10
     for frame, level, text in seen:
@@ -108,8 +115,8 @@ def test_no_wrong_frame_while_levels_change(
 
 
 @DECODERS
-def test_playing_goes_over_the_borders_of_segments_and_round(new_player: NewPlayer, take: Path, script: str) -> None:
-    player = opened(new_player({"asset": take}, script=script))
+def test_playing_goes_over_the_borders_of_segments_and_round(opened: Opened, take: Path, script: str) -> None:
+    player = opened(take, script=script)
     seen = player.run(
         """const seen = [];
         await e.seek(20);
@@ -149,8 +156,8 @@ def test_ten_minutes_start_within_two_seconds(new_player: NewPlayer, ten_minutes
     assert time.monotonic() - started < 2
 
 
-def test_memory_does_not_grow_with_the_take(new_player: NewPlayer, ten_minutes: Path) -> None:
-    player = opened(new_player({"asset": ten_minutes}))
+def test_memory_does_not_grow_with_the_take(opened: Opened, ten_minutes: Path) -> None:
+    player = opened(ten_minutes)
     session = player.page.context.new_cdp_session(player.page)
 
     def heap() -> float:
@@ -170,19 +177,17 @@ def test_memory_does_not_grow_with_the_take(new_player: NewPlayer, ten_minutes: 
     assert heaps[-1] < heaps[0] + 2e6
 
 
-def test_a_segment_that_is_damaged_is_named(new_player: NewPlayer, take: Path, tmp_path: Path) -> None:
+def test_a_segment_that_is_damaged_is_named(opened: Opened, take: Path, tmp_path: Path) -> None:
     folder = Path(shutil.copytree(take, tmp_path / "asset"))
     for name in ("full.mp4", "small.mp4"):
-        data = bytearray((folder / name).read_bytes())
-        data[-100] ^= 1
-        (folder / name).write_bytes(data)
-    player = opened(new_player({"asset": folder}))
+        (folder / name).write_bytes(flipped((folder / name).read_bytes(), -100))
+    player = opened(folder)
     player.run("e.seek(v)", FRAMES - 1)
     assert "is damaged" in player.notice()
 
 
-def test_it_goes_on_when_the_connection_is_back(new_player: NewPlayer, ten_minutes: Path) -> None:
-    player = opened(new_player({"asset": ten_minutes}, allow=("ERR_FAILED", "Failed to load")))
+def test_it_goes_on_when_the_connection_is_back(opened: Opened, ten_minutes: Path) -> None:
+    player = opened(ten_minutes, allow=("ERR_FAILED", "Failed to load"))
     refuse = lambda route: route.abort()  # noqa: E731
     player.page.route("**/*.mp4", refuse)
     player.run("globalThis.there = e.seek(9000).then((done) => (globalThis.done = done)); return 0")
@@ -201,13 +206,13 @@ def test_a_server_without_byte_ranges_will_do(
         route.fulfill(status=200, body=(take / name).read_bytes(), content_type="video/mp4")
 
     player.page.route("**/*.mp4", whole)
-    opened(player)
-    assert player.run("return await e.seek(40)")
+    player.open("asset", full=True)
+    assert player.run("e.background = v; return await e.seek(40)", GREY)
     assert shows(player.capture(CAMERA)[..., :3], pictures["full"], 40)
 
 
-def test_the_sound_is_fetched_as_it_is_needed(new_player: NewPlayer, take: Path) -> None:
-    player = opened(new_player({"asset": take}))
+def test_the_sound_is_fetched_as_it_is_needed(opened: Opened, take: Path) -> None:
+    player = opened(take)
     player.wait("e.player.sound !== null")
     assert not any(url.endswith("audio.mp4") for url in player.requests)
     heard = player.run(
