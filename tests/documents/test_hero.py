@@ -18,15 +18,11 @@ from tests.assets import make_asset
 
 
 def test_the_whole_take_is_25_frames_a_second() -> None:
-    capture = CaptureParams.model_validate(hero.hero_params({})["subjects"]["hero"]["capture"])
+    params = hero.hero_params({})
+    capture = CaptureParams.model_validate(params["subjects"]["hero"]["capture"])
     assert (capture.frames, capture.seconds, capture.frame_rate) == (100, 4.0, 25.0)
     assert (capture.width, capture.height) == (500, 768)
-
-
-def test_what_fits_small_pictures_is_not_asked_of_the_whole_take() -> None:
-    """R^m and R^t: numbers would be of pictures of 192 x 128."""
-    params = hero.hero_params({})
-    for name in ("decimate", "texture"):
+    for name in ("decimate", "texture"):  # R^m and R^t: numbers would be of pictures of 192 x 128
         sections = {**params.get(name, {}), **params["subjects"]["hero"].get(name, {})}
         assert sections.get("resolution", "auto") == "auto"
 

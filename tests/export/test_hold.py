@@ -22,11 +22,11 @@ from tests.scenes import look_at_origin
 from tests.training.reference import look_up
 
 
-def kept(y: Sequence[float], price: float) -> np.ndarray:
-    """Of one channel."""
-    x = np.array(y, np.float64)[:, None]
+def kept(y: Sequence[float] | np.ndarray, price: float) -> np.ndarray:
+    """Of y (K, Q), or of one channel."""
+    x = np.array(y, np.float64).reshape(len(y), -1)
     pieces(x, price, np.empty(len(x) + 1), np.empty(len(x), np.int64))
-    return x[:, 0]
+    return x.reshape(np.shape(y))
 
 
 def best_of_all(y: np.ndarray, price: float) -> np.ndarray:
@@ -48,9 +48,7 @@ def test_the_minimum_is_that_of_all_pieces(seed: int) -> None:
     rng = np.random.default_rng(seed)
     y = rng.normal(0, 10, (rng.integers(1, 10), rng.integers(1, 4)))
     price = float(rng.uniform(1, 300))
-    x = y.copy()
-    pieces(x, price, np.empty(len(x) + 1), np.empty(len(x), np.int64))
-    assert x == pytest.approx(best_of_all(y, price))
+    assert kept(y, price) == pytest.approx(best_of_all(y, price))
 
 
 def test_nothing_is_held_for_nothing_and_all_at_any_price() -> None:

@@ -19,18 +19,17 @@ from facefolds_core.serving.player import find_player
 from tests.assets import make_asset
 
 
-def test_the_asset_made_last_is_taken(tmp_path: Path) -> None:
+def test_the_asset_made_last_is_taken_and_what_is_not_there_is_made_by_a_command(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match="make repro"):
+        latest_asset(tmp_path)
+    with pytest.raises(UserError, match="make view"):
+        find_player((tmp_path,))
     for age, name in enumerate(("new", "old")):
         manifest = tmp_path / name / "asset" / "manifest.json"
         manifest.parent.mkdir(parents=True)
         manifest.write_text("{}")
         os.utime(manifest, (1000 - age, 1000 - age))
     assert latest_asset(tmp_path) == tmp_path / "new" / "asset"
-
-
-def test_without_any_asset_it_says_how_to_make_one(tmp_path: Path) -> None:
-    with pytest.raises(UserError, match="make repro"):
-        latest_asset(tmp_path)
 
 
 @pytest.mark.parametrize("name", ["asset", "asset/manifest.json", "asset.glb", "."])
@@ -46,11 +45,6 @@ def test_what_names_no_asset_is_told_what_does(tmp_path: Path, name: str, said: 
     (tmp_path / "still.glb").touch()
     with pytest.raises(UserError, match=said):
         asset_folder(tmp_path / name)
-
-
-def test_a_player_that_is_not_built(tmp_path: Path) -> None:
-    with pytest.raises(UserError, match="make view"):
-        find_player((tmp_path,))
 
 
 def test_it_serves_until_it_is_interrupted(tmp_path: Path, player_folder: Path, project_root: Path) -> None:
