@@ -24,14 +24,11 @@ def grids() -> Grids:
     return sample_grids(Ellipsoids(), 48, WINDOW)
 
 
-def test_vertices_are_the_samples_with_exact_texture_coordinates(grids: Grids) -> None:
-    for layer, mesh in enumerate(full_meshes(grid_sheets(grids, None))):
+def test_vertices_are_the_samples_and_faces_look_outward_and_fill_the_grid(grids: Grids) -> None:
+    sheets = grid_sheets(grids, None)
+    for layer, mesh in enumerate(full_meshes(sheets)):
         assert np.abs(mesh.vertices - grids.points[layer].reshape(-1, 3)).max() < 1e-6
         assert np.abs(mesh.st - exact_st(mesh.vertices, WINDOW, grids.chart)).max() < 1e-5
-
-
-def test_faces_look_outward_and_fill_the_grid(grids: Grids) -> None:
-    sheets = grid_sheets(grids, None)
     towards, faces = sheets.chart.directions(vertex_uv(sheets)), sheet_faces(sheets)
     assert len(faces) == 2 * 47 * 47
     assert (np.linalg.det(towards[faces]) > 0).all()

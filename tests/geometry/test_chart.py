@@ -37,25 +37,17 @@ def positions(offsets, belt, out):  # type: ignore[no-untyped-def]
 
 
 @pytest.mark.parametrize("chart", [SPHERE, *CHARTS], ids=str)
-def test_there_and_back(chart: Chart) -> None:
+def test_there_and_back_in_numpy_and_torch(chart: Chart) -> None:
     uv, radius = places(chart)
     if chart.belt is not None:
         assert 0.2 < chart.below(uv).mean() < 0.8
-    back, found = chart.uv(chart.points(uv, radius))
-    np.testing.assert_allclose(back, uv, atol=1e-12)
-    np.testing.assert_allclose(found, radius, atol=1e-12)
-
-
-@pytest.mark.parametrize("chart", [SPHERE, *CHARTS], ids=str)
-def test_torch_does_as_numpy(chart: Chart) -> None:
-    uv, radius = places(chart)
-    points = chart.points(torch.from_numpy(uv), torch.from_numpy(radius))
-    np.testing.assert_allclose(points.numpy(), chart.points(uv, radius), atol=1e-14)
-    back, found = chart.uv(points)
-    np.testing.assert_allclose(back.numpy(), uv, atol=1e-12)
-    np.testing.assert_allclose(found.numpy(), radius, atol=1e-12)
-    single, _ = chart.uv(points.float())
-    assert single.dtype == torch.float32
+    points = chart.points(uv, radius)
+    tensor = chart.points(torch.from_numpy(uv), torch.from_numpy(radius))
+    np.testing.assert_allclose(tensor.numpy(), points, atol=1e-14)
+    for back, found in (chart.uv(points), chart.uv(tensor)):
+        np.testing.assert_allclose(back, uv, atol=1e-12)
+        np.testing.assert_allclose(found, radius, atol=1e-12)
+    assert chart.uv(tensor.float())[0].dtype == torch.float32
 
 
 def test_below_the_belt_in_closed_form() -> None:

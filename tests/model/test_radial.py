@@ -53,7 +53,9 @@ def test_concentric_spheres_in_closed_form(grad: bool) -> None:
         torch.testing.assert_close(crossings.distance[hit, layer], expected[hit], atol=3e-6, rtol=0)
 
 
-def test_compiled_search_matches_the_reference() -> None:
+def test_layers_are_nested_and_the_compiled_search_matches_the_reference() -> None:
+    radii = _bumpy().radii()
+    assert (radii[..., :-1] > radii[..., 1:]).all()
     check_compiled(_bumpy(), *_rays(500), share=0.998)
 
 
@@ -67,11 +69,6 @@ def test_layers_that_moved_are_met_where_they_are_now() -> None:
         after = manifolds.crossings(origins, directions).distance
         assert torch.equal(after, moved.crossings(origins, directions).distance)
     assert (after > before + 0.01).any()
-
-
-def test_layers_are_nested() -> None:
-    radii = _bumpy().radii()
-    assert (radii[..., :-1] > radii[..., 1:]).all()
 
 
 def test_there_is_no_surface_outside_the_window() -> None:

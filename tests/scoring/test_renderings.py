@@ -57,8 +57,10 @@ def test_a_halo_is_along_the_outline_not_inside() -> None:
 
 
 def test_without_a_plate_nothing_is_over_it() -> None:
-    found = scores(rendering(MASK), replace(TRUTH, plate=None))
+    """And with true masks nothing else is gone by."""
+    found = scores(rendering(MASK), replace(TRUTH, plate=None, matte=np.ones_like(MASK)))
     assert [found[name] for name in ("psnr_over_plate", "ssim_over_plate", "psnr_band_over_plate")] == [None] * 3
+    assert [found[name] for name in FOUND_METRICS] == [None] * len(FOUND_METRICS)
 
 
 def test_without_masks_the_matte_that_was_found_says_where_the_subject_is() -> None:
@@ -76,8 +78,3 @@ def test_a_matte_of_the_scene_does_not_depend_on_the_model() -> None:
     found = scores(rendering(MASK, wrong_left), truth, "scene")
     assert found["psnr_found"] == MAX_PSNR
     assert scores(rendering(MASK, wrong_left), truth, "found")["psnr_found"] < 12  # type: ignore[operator]
-
-
-def test_with_true_masks_nothing_else_is_gone_by() -> None:
-    found = scores(rendering(MASK), replace(TRUTH, matte=np.ones_like(MASK)))
-    assert [found[name] for name in FOUND_METRICS] == [None] * len(FOUND_METRICS)

@@ -101,6 +101,8 @@ def test_a_ball_keeps_the_sphere_farthest_back() -> None:
     # A radian below a belt is as long as one around it.
     girths = {chart.centre[0]: chart.belt.girth for chart in losses if chart.belt is not None}
     assert girths[-0.2] == pytest.approx(0.25)
+    _, plain = outline.choose_chart(volume, [points], START.model_copy(update={"belts": ()}))
+    assert list(plain) == [Chart((x, 0.0, 0.0)) for x in START.centres]
 
 
 def test_a_chart_that_takes_much_from_one_camera_does_not_win(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -126,13 +128,6 @@ def test_surface_nearer_to_the_centre_than_layers_may_lie_is_lost() -> None:
     within, behind = (Chart((x, 0.0, 0.0)) for x in (AXIS, AXIS - 0.2))
     assert outline.lost(small, within, points, START).all()
     assert outline.lost(small, behind, points, START).mean() < 0.5
-
-
-def test_no_belt_is_tried_where_none_is_asked_for() -> None:
-    volume, points = ball()
-    _, losses = outline.choose_chart(volume, [points], START.model_copy(update={"belts": ()}))
-    assert [chart.centre[0] for chart in losses] == list(START.centres)
-    assert all(chart.belt is None for chart in losses)
 
 
 def test_the_profile_of_a_neck_is_its_radius(bust: Volume) -> None:

@@ -122,10 +122,7 @@ def test_pictures_that_tell_nothing_stop_only_who_asked(scene: Scene, monkeypatc
     assert with_found_poses(scene, NormalizeParams(stabilize="auto")) is scene
     with pytest.raises(UserError, match="no subject"):
         with_found_poses(scene, NormalizeParams(stabilize="found"))
-
-
-def test_a_scene_that_has_poses_keeps_them(scene: Scene) -> None:
-    posed = replace(scene, poses=TRACK)
+    posed = replace(scene, poses=TRACK)  # it keeps those that it has
     assert with_found_poses(posed, NormalizeParams(stabilize="auto")) is posed
 
 

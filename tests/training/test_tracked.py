@@ -27,9 +27,7 @@ def test_mesh_is_kept_near_the_volume_and_left_far_from_it() -> None:
     deep = np.where(np.arange(41) == 20, 0.3 - 2 * REACH, volume)
     np.testing.assert_array_equal(blend(mesh, deep, REACH)[0][5, 20], 0.3)  # a hole of the volume
     assert radii[5, 20] == 0.3 and kept[5, 20] == 1 and kept[5, 5] == 0 and kept[5, 35] == 0
-
-
-def test_where_few_cameras_look_the_mesh_is_believed_farther_from_the_volume() -> None:
+    # Where few cameras look the mesh is believed farther from the volume.
     mesh, volume = np.full((41, 41), 0.3), np.full((41, 41), 0.3 + 2 * REACH)
     radii, kept = blend(mesh, volume, np.where(np.arange(41) < 20, FAR, REACH))
     assert radii[5, 5] == 0.3 and kept[5, 5] == 1
