@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -122,6 +123,13 @@ def test_a_garbled_stage_config_is_a_user_error(tmp_path: Path) -> None:
     (tmp_path / "texture.json").write_text("{")
     with pytest.raises(UserError, match=r"texture\.json"):
         read_stage(TextureParams, tmp_path)
+
+
+def test_what_is_configured_is_what_runs(project_root: Path) -> None:
+    """Parameters are changed on the way in one place, for the levels of an asset; the manifest says what ran there."""
+    changed = re.compile(r"\b(params|config)(\.\w+)*\.model_copy\(|\breplace\((params|config|settings)\b")
+    library = (project_root / "facefolds_core").rglob("*.py")
+    assert {path.name for path in library if changed.search(path.read_text(encoding="utf-8"))} == {"settings.py"}
 
 
 def test_every_file_of_the_configuration_is_an_object(tmp_path: Path) -> None:
