@@ -53,7 +53,8 @@ def contradicted(cameras: Sequence[Camera], silhouettes: Sequence[Bool], ball: f
         rows, columns, seen = _pixels(camera, places)
         image = np.zeros(silhouette.shape, np.uint8)
         image[rows[seen], columns[seen]] = 1
-        reach = max(1, round(ball / CELLS * camera.K[0, 0] / float(camera.w2c[2, 3])))
+        depth = max(float(camera.w2c[2, 3]), ball)  # one that stands in the ball, or looks away, sees no place larger
+        reach = max(1, round(ball / CELLS * camera.K[0, 0] / depth))
         square = np.ones((2 * reach + 1, 2 * reach + 1), np.uint8)
         found.append(np.asarray((cv2.dilate(image, square) > 0) & ~silhouette))
     return found

@@ -247,6 +247,16 @@ def test_where_too_few_others_look_nothing_is_contradicted(scene: Scene) -> None
     assert not any(found.any() for found in contradicted(scene.cameras[:3], silhouettes, 0.5))
 
 
+def test_a_camera_beside_the_subject_and_one_without_a_silhouette_break_nothing(scene: Scene) -> None:
+    colours, opacities = cut_outs(scene)
+    w2c = scene.cameras[0].w2c.copy()
+    w2c[2, 3] = 0  # the subject's middle lies beside it
+    cameras, silhouettes = [replace(scene.cameras[0], w2c=w2c), *scene.cameras[1:]], [one > 0.5 for one in opacities]
+    silhouettes[0][:] = False
+    assert len(contradicted(cameras, silhouettes, 0.5)) == CAMERAS
+    assert looks_like(colours[0] + 0.5, np.zeros((SIZE, SIZE), np.float32)).shape == (SIZE, SIZE)
+
+
 def test_a_file_of_another_program(scene: Scene, splats: Splats, tmp_path: Path) -> None:
     """Of a head that turns it is brought into the head's own frame."""
     opaque = Splats(splats.values, np.zeros(3, np.float32))
