@@ -156,13 +156,22 @@ def _doubted(scene: Scene, mattes: Mattes, views: Sequence[View], ball: float) -
     found = list[View]()
     for frame in dict.fromkeys(view.key[1] for view in views):
         those = [view for view in views if view.key[1] == frame]
+        if all(view.source != "plate" for view in those):
+            found += those
+            continue
         cameras, silhouettes = [scene.camera_in_head(*view.key) for view in those], [v.opacity > 0.5 for v in those]
-        for view, against in zip(those, contradicted(cameras, silhouettes, ball), strict=True):
-            picture = mattes.picture(view.key)
-            doubted = np.dstack([picture, np.ones_like(view.opacity)])
-            doubted *= (against & looks_like(picture, view.opacity))[..., None]
-            found.append(replace(view, doubtful=doubted) if view.source == "plate" else view)
+        against = contradicted(cameras, silhouettes, ball)
+        pairs = zip(those, against, strict=True)
+        found += [
+            _in_doubt(view, mattes.picture(view.key), one) if view.source == "plate" else view for view, one in pairs
+        ]
     return found
+
+
+def _in_doubt(view: View, picture: Array, against: NDArray[np.bool_]) -> View:
+    """A view whose picture (H, W, 3) others contradict (H, W)."""
+    doubted = np.dstack([picture, np.ones_like(view.opacity)])
+    return replace(view, doubtful=doubted * (against & looks_like(picture, view.opacity))[..., None])
 
 
 def judged(scene: Scene, splats: Splats, views: Sequence[View]) -> tuple[CameraFit, float]:

@@ -61,8 +61,9 @@ def contradicted(cameras: Sequence[Camera], silhouettes: Sequence[Bool], ball: f
 
 
 def looks_like(picture: Array, opacity: Array) -> Bool:
-    """(H, W) where a picture (H, W, 3) has a colour, in [0, 1], that the subject, of opacity (H, W), has nearby: of few
-    cameras others contradict much of the room.
+    """(H, W) where a picture (H, W, 3), in [0, 1], has a colour that the subject, of opacity (H, W), has nearby.
+
+    What few cameras contradict is much of the room; most of it looks otherwise.
     """
     inside = (opacity > SOLID).astype(np.float32)
     weight = _near(inside)
