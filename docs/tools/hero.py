@@ -3,9 +3,9 @@
     make hero                                              or python -m docs.tools.hero; hours on two cores
     python -m docs.tools.hero --frames 12 --seconds 1.5         a shorter one: minutes
 
-In dist/hero: run/ (a project of its own, so that an interrupted run goes on), asset/, hero.html (plays by a double
-click; `make docs` shows it on the first page), frames.jpg (eyes and mouth of 25 frames, the photo above the asset),
-hero.zip (asset and page, with the scores and the licence).
+In dist/hero: run/ (a project of its own, so that an interrupted run goes on), asset/, hero.html (the finest level of at
+most 6 MB; plays by a double click; `make docs` shows it on the first page), frames.jpg (eyes and mouth of 25 frames, a
+photo above the asset), hero.zip (asset and page, with the scores and the licence).
 """
 
 from __future__ import annotations
@@ -30,6 +30,7 @@ from facefolds_core.errors import UserError, report_user_errors
 from facefolds_core.files.paths import SubjectFolders
 from facefolds_core.files.writing import atomic_file, atomic_folder, read_json, write_text
 from facefolds_core.params import merged
+from facefolds_core.reporting.face import embedded
 from facefolds_core.scoring.terminal import HEADLINE_WORDS
 from facefolds_core.serving.player import find_player
 from facefolds_core.system.processes import own_environment
@@ -93,7 +94,8 @@ def release(folders: SubjectFolders, out: Path) -> list[Path]:
     out.mkdir(parents=True, exist_ok=True)
     page, packed = out / "hero.html", out / "hero.zip"
     write_text(out / Path(HERO_COMMIT).name, commit_name())
-    write_single_page(page, folders.asset, asset.manifest, asset.full.entry, find_player())
+    level = embedded(asset) or asset.manifest.levels[0]
+    write_single_page(page, folders.asset, asset.manifest, level, find_player())
     with atomic_folder(out / "asset") as temporary:
         shutil.copytree(folders.asset, temporary, dirs_exist_ok=True)
     with atomic_file(packed) as temporary, zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as zipped:

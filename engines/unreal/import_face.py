@@ -4,10 +4,10 @@
     facefolds export usd data/actor/asset face_usd        # its textures/ are the image sequence
     py import_face.py C:/face.glb C:/face_usd/textures    # in Unreal's console, with the plugins Python and Img Media
 
-Written against the Python API of 5.5, tried against a stub. It makes /Game/facefolds: the meshes, `M_core` (masked) and
-`M_shell` (translucent), both unlit, and a media player that loops. Then place the meshes and open the source in the
-player. Colours go through linear light and tone mapping; backs are left out; the head's motion and the reflection are
-not brought along.
+Every name in it is one of the Python API of 5.6 (unreal-stub 0.3 has them all); only a mock has taken it. It makes
+/Game/facefolds: the meshes, `M_core` (masked) and `M_shell` (translucent), both unlit, and a media player that loops.
+Then place the meshes and open the source in the player. Colours go through linear light and tone mapping; backs are
+left out; the head's motion and the reflection are not brought along.
 """
 
 from __future__ import annotations
@@ -80,6 +80,7 @@ def material_of(name: str, blending: Any, opacity: Any, texture: Any, said: dict
         look = edit.create_material_expression(material, unreal.MaterialExpressionTextureSampleParameter2D, -500, 0)
         look.set_editor_property("parameter_name", part)
         look.set_editor_property("texture", texture)
+        look.set_editor_property("sampler_type", unreal.MaterialSamplerType.SAMPLERTYPE_EXTERNAL)
         edit.connect_material_expressions(there, "", look, "UVs")
         edit.connect_material_property(look, output, wanted)
     edit.recompile_material(material)

@@ -25,6 +25,8 @@ from tests.hostile.structured import damage_values
 from tests.viewer.fixtures import moving_asset
 
 Document = dict[str, Any]
+DAMAGED = 1000
+"""Files, which take seconds."""
 PLACE = re.compile(r"^(/.*|byte \d+): .+")
 
 
@@ -116,13 +118,12 @@ def damaged(whole: Path, random: np.random.Generator) -> bytes:
     return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
 
 
-@pytest.mark.parametrize("seeds", [range(200), pytest.param(range(200, 1200), marks=pytest.mark.nightly)], ids=str)
-def test_damaged_files_are_refused_in_words_or_harmless(whole: Path, tmp_path: Path, seeds: range) -> None:
+def test_damaged_files_are_refused_in_words_or_harmless(whole: Path, tmp_path: Path) -> None:
     file, refused = tmp_path / "a.glb", 0
-    for seed in seeds:
+    for seed in range(DAMAGED):
         file.write_bytes(damaged(whole, np.random.default_rng(seed)))
         problems = check_glb(file)
         refused += bool(problems)
         wordless = [problem for problem in problems if not PLACE.match(problem) or "Traceback" in problem]
         assert wordless == [], seed
-    assert refused > 0.6 * len(seeds)
+    assert refused > 0.6 * DAMAGED

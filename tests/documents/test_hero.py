@@ -41,8 +41,10 @@ def test_what_is_packed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None
     make_asset(folders.asset)
     write_json(folders.metrics, {"headline": "psnr_subject", "asset": {"psnr_subject": 26.5}})
     monkeypatch.setattr(hero, "find_player", lambda: tmp_path)
-    monkeypatch.setattr(hero, "write_single_page", lambda out, *_: out.write_text("<html>"))
+    monkeypatch.setattr(hero, "write_single_page", lambda out, _, __, level, ___: out.write_text(level.name))
+    monkeypatch.setattr(hero, "embedded", lambda asset: asset.manifest.full.model_copy(update={"name": "medium"}))
     page, packed = hero.release(folders, tmp_path / "out")
+    assert page.read_text() == "medium"  # the full level may be too large for a page
     with zipfile.ZipFile(packed) as zipped:
         zipped.extractall(tmp_path / "there")
         assert "26.50 dB of the subject" in zipped.read("README.txt").decode()

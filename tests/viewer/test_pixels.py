@@ -47,9 +47,7 @@ def of_pixel_means(asset: Asset, camera: Camera, frame: int = 0) -> NDArray[np.f
     return expected_means(asset, [camera], [frame])[camera.name, frame]
 
 
-@pytest.mark.parametrize(
-    ("size", "script"), [(SIZE, ""), (SIZE, NO_WEBCODECS), pytest.param(96, "", marks=pytest.mark.nightly)]
-)
+@pytest.mark.parametrize(("size", "script"), [(SIZE, ""), (SIZE, NO_WEBCODECS), (96, "")])
 def test_five_cameras_and_three_frames_agree_with_the_reference(
     show: Show, caps: Asset, size: int, script: str
 ) -> None:

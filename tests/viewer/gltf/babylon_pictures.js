@@ -17,7 +17,7 @@ DracoDecoder.DefaultConfiguration = {
 
 export async function opened(file, width, height) {
   const canvas = Object.assign(document.createElement("canvas"), { width, height });
-  const engine = new Engine(canvas, false, { preserveDrawingBuffer: true });
+  const engine = new Engine(canvas, false, { preserveDrawingBuffer: true, useExactSrgbConversions: true });
   const scene = new Scene(engine);
   scene.activeCamera = new FreeCamera("camera", Vector3.Zero(), scene);
   const { meshes } = await ImportMeshAsync(file, scene);
