@@ -9,6 +9,8 @@ player.jpg and sizes.jpg Chromium and the player that `make view` builds.
 
 from __future__ import annotations
 
+import base64
+import io
 from collections.abc import Callable, Sequence
 from fractions import Fraction
 from functools import partial
@@ -47,12 +49,12 @@ PAGE: dict[str, Any] = {"widths": [1280, 390], "height": 1000, "gap": 24, "patie
 """CSS pixels: a desktop, and a phone beside it; milliseconds until the player in it plays."""
 PLAYER: dict[str, Any] = {"gap": 20, "width": 1600, "patience": 1500, "quality": 86}
 SIZES: dict[str, Any] = {**PLAYER, "gap": 40, "width": 1200}
-PLAYER |= {"panes": [[1000, 660, "frame=4"], [1000, 660, "frame=0&spread=1"]]}
+PLAYER |= {"panes": [[1000, 660, "frame=4"], [1000, 660, "frame=0&spread=1&background=daylight"]]}
 PLAYER["panes"] += [[390, 660, "frame=0"]]
 SIZES["panes"] = [[1440, 900, "frame=0&background=white"], [390, 844, "frame=0&background=grey"]]
-SIZES["panes"] += [[360, 240, "frame=0&background=daylight"]]
-"""CSS pixels of the windows, and what each shows, as in the player's links; the picture's width; milliseconds for what
-glides."""
+SIZES["panes"] += [[360, 240, "frame=0&background=daylight"], [360, 240, "frame=0&background=transparent"]]
+"""CSS pixels of the windows, and what each shows, as in the player's links (a transparent one stands before a picture
+of her room); the picture's width; milliseconds for what glides."""
 FULL = "document.querySelector('facefolds-player').level === 'full'"
 LIMITS: dict[str, Any] = {"size": [500, 768], "panel": [216, 264], "gap": 6, "frame": 2, "quality": 85}
 LIMITS |= {"views": [[115, 8, 30, 40, 440], [24, 12, 220, 25, 216], [4, 2, 130, 380, 216]]}
@@ -165,16 +167,44 @@ def player(options: dict[str, Any], subject: Path, out: Path) -> None:
     """
     with serving(find_player(), {"asset": subject / "asset"}) as address, headless() as started:
         shots = [
-            screen(started, f"{address}?src=asset/#level=full&{view}", size, options["patience"], FULL)
+            screen(
+                started,
+                f"{address}?src=asset/#level=full&{view}",
+                size,
+                options["patience"],
+                FULL,
+                room(*size) if "transparent" in view else None,
+            )
             for *size, view in options["panes"]
         ]
     side_by_side(shots, options["gap"], out, options["quality"], options["width"])
 
 
-def screen(started: Browser, address: str, size: Sequence[int], patience: int, there: str = "true") -> Image.Image:
-    """A page in a window of `size` CSS pixels (a narrow one is a phone's), `patience` ms after `there` holds."""
+def room(width: int, height: int) -> str:
+    """The actor's empty room, as an address of CSS."""
+    picture = render(camera_at("room", 0, 0, width, height), 0.0, ActorOptions(away=1.0)).rgb
+    held = io.BytesIO()
+    Image.fromarray(picture).save(held, "PNG")
+    return f"url(data:image/png;base64,{base64.b64encode(held.getvalue()).decode()})"
+
+
+def screen(
+    started: Browser,
+    address: str,
+    size: Sequence[int],
+    patience: int,
+    there: str = "true",
+    behind: str | None = None,
+) -> Image.Image:
+    """A page in a window of `size` CSS pixels (a narrow one is a phone's), `patience` ms after `there` holds.
+
+    Args:
+        behind: picture of CSS behind the player.
+    """
     tab = started.new_page(viewport={"width": size[0], "height": size[1]}, has_touch=size[0] < 500)
     tab.goto(address)
+    if behind is not None:
+        tab.evaluate("behind => (document.querySelector('facefolds-player').style.backgroundImage = behind)", behind)
     tab.wait_for_function(f"() => {there}", timeout=120_000)
     tab.wait_for_timeout(patience)
     shot = open_picture(tab.screenshot()).convert("RGB")
