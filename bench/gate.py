@@ -39,7 +39,7 @@ KEPT = ROOT / "bench" / "results" / "gate.json"
 COLOURS = ((1.0, 1.0, 1.0), (0.0, 0.0, 0.0), (0.1, 0.7, 0.2))
 TWO: dict[str, Any] = {"source": "multiface", "holdout": ["400013", "400060"], "pixel_centres": 0.5}
 SPARSE: dict[str, Any] = {"source": "multiface", "holdout": ["06", "13"], "front": "07", "pixel_centres": 0.5}
-CLUTTER = {"clutter": 1.0, "plates": False}
+CLUTTER = {"clutter": 1.0, "plates": False, "frames": 12}
 
 TOLERANCES: dict[str, tuple[int, float, int]] = {
     "psnr_any": (1, 0.15, 2),
@@ -106,8 +106,8 @@ CASES: dict[str, tuple[str, dict[str, Any]]] = {
     "moving": ("moving", TWO),
     "buddha": ("buddha", {"source": "transforms", "front": "00036", "holdout": ["00022", "00031"]}),
     "fox": ("fox", {"source": "transforms", "front": "0019", "holdout": {"every": 7}}),
-    **{f"actor, {count} cameras": ("", {"validate": aside(count)}) for count in (12, 8)},
-    "plain room": ("", {"capture": {"plates": False}}),
+    **{f"actor, {count} cameras": ("", {"validate": aside(count), "capture": {"frames": 12}}) for count in (12, 8)},
+    "plain room": ("", {"capture": {"plates": False, "frames": 12}}),
     "clutter": ("", {"capture": CLUTTER}),
     **{f"actor, seed {seed}": ("", {"train": {"seed": seed}}) for seed in (1, 2)},
 }

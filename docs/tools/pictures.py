@@ -61,7 +61,7 @@ LIMITS |= {"views": [[115, 8, 30, 40, 440], [24, 12, 220, 25, 216], [4, 2, 130, 
 """Azimuth and elevation in degrees, then left, top and width of what is cut out of a picture of `size`, pixels."""
 
 
-FRAMES: dict[str, Any] = {"camera": "A011", "panel": [150, 172], "columns": 6, "most": 30, "gap": 4, "quality": 84}
+FRAMES: dict[str, Any] = {"camera": "A011", "panel": [110, 126], "columns": 9, "most": 36, "gap": 4, "quality": 84}
 FRAMES |= {"corners": [[-58, -34, 930], [58, 92, 930]]}
 """A held-out camera; pixels of a picture, pictures a row, frames at most; eyes and mouth lie between the corners,
 millimetres in the world of the actor's capture."""

@@ -15,7 +15,7 @@ class CaptureParams(Section):
     cameras: Annotated[int, Field(ge=3, le=100_000)] = 24
     """Number of cameras of the rig."""
 
-    frames: Count = 12
+    frames: Count = 36
     """Number of frames, evenly spread over `seconds`."""
 
     seconds: Annotated[float, Field(gt=0, le=3600)] = 1.5
