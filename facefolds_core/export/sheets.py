@@ -22,13 +22,17 @@ from facefolds_core.geometry.sphere_uv import st_to_uv, texel_uv, uv_to_st
 
 Array = NDArray[np.float64]
 
+ALL_AROUND = 4 - 1e-9
+"""v of a window that goes all around the head: 360 degrees."""
+
 
 def grid_sheets(grids: Grids, resolution: int | None) -> Sheets:
     """The samples themselves as vertices.
 
     Where a layer has no point its radius is that of the nearest direction in which it has one; no face of it lies
     there. A sample beyond the layer around it is moved onto it. Each cell's diagonal joins the two corners whose radii,
-    over all layers, differ less: along a jump of the radius, not across it.
+    over all layers, differ less: along a jump of the radius, not across it. Where the window goes all around, its first
+    and its last column lie on its borders, behind the head, at one place.
 
     Args:
         grids: with one window for all layers.
@@ -48,6 +52,10 @@ def grid_sheets(grids: Grids, resolution: int | None) -> Sheets:
     )
     window = grids.window(0)
     st = uv_to_st(texel_uv(grids.resolution, grids.resolution, window), window)[thin[1:]]
+    if window[3] - window[2] >= ALL_AROUND:
+        # Both borders are one line: they meet there.
+        st[:, 0, 0], st[:, -1, 0] = 0, 1
+        radii[:, :, 0] = radii[:, :, -1] = (radii[:, :, 0] + radii[:, :, -1]) / 2
     return Sheets(st, radii.astype(np.float32), valid, grids.opacity[thin], falling, grids.windows[0], grids.chart)
 
 

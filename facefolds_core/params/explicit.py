@@ -13,7 +13,7 @@ class StartParams(Section):
     """Charts that are tried for the subject as it was found."""
 
     centres: Annotated[Many[Annotated[float, Field(ge=-10, le=10)]], Field(min_length=1, max_length=1000)] = (
-        *(-0.1, -0.15, -0.2, -0.25),
+        *(-0.05, -0.1, -0.15, -0.2, -0.25),
         *(-0.3, -0.35, -0.4),
     )
     """Candidates for x of the sphere centre c = (x, 0, 0), units. The paper's is -0.25."""
@@ -36,8 +36,9 @@ class StartParams(Section):
     column_limit: ClassVar[float] = 1.5
     """Largest -u of a window below a belt."""
 
-    azimuth_limit: ClassVar[float] = 1.5
-    """Largest |v| of a window; 1 is straight sideways from c."""
+    azimuth_limit: ClassVar[float] = 2.0
+    """Largest |v| of a window; 1 is straight sideways from c, 2 straight backwards: a head that was filmed all around
+    is closed there."""
 
     subject_opacity: ClassVar[float] = 0.5
     """Opacity of the subject's Gaussians from which on a direction holds the subject."""

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import trimesh
 
 from facefolds_core.export.collapse import contribution, decimated_ladder
 from facefolds_core.export.decimation import exact_st
@@ -69,6 +70,17 @@ def test_the_border_stays_where_it_was(sheets: Sheets) -> None:
         assert mesh.st.min() == pytest.approx(0.5 / N)
         assert mesh.st.max() == pytest.approx(1 - 0.5 / N)
         assert covered_area(mesh) == pytest.approx((1 - 1 / N) ** 2, rel=1e-5)
+
+
+def test_a_window_that_goes_all_around_leaves_no_slit() -> None:
+    """Rays near the seam, from inside: without its borders at one place a cell's width lay open behind the head."""
+    window = (-0.5, 0.6, -2.0, 2.0)
+    for mesh in decimated_ladder(grid_sheets(sample_grids(Ellipsoids(), N, window), None), [400])[400]:
+        angle = np.linspace(-0.1, 0.1, 41) / N
+        outwards = np.stack([-np.cos(angle), np.sin(angle), 0 * angle], -1)
+        starts = np.tile(CENTRE, (len(angle), 1))
+        assert trimesh.Trimesh(mesh.vertices, mesh.faces, process=False).ray.intersects_any(starts, outwards).all()
+        assert (mesh.st[:, 0].min(), mesh.st[:, 0].max()) == (0, 1)
 
 
 def covered_area(mesh: TexturedMesh) -> float:

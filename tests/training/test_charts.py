@@ -146,12 +146,14 @@ def test_windows_reach_behind_the_ears_and_below_the_pole_where_something_is_see
     u0, u1, v0, v1 = fit_window(bust, chart, ears, None, START)
     assert -START.azimuth_limit <= v0 < -1.2 and 1.2 < v1 <= START.azimuth_limit
     assert -0.3 < u0 < u1 < 0.3
+    back = chart.points(np.array([[0.0, -1.99], [0.0, 1.99]]), np.full(2, HEAD))
+    assert fit_window(bust, chart, back, None, START)[2:] == (-2, 2)  # which is one line: the head is closed
 
 
 def test_a_subject_beyond_every_window_is_said(bust: Volume) -> None:
-    behind = np.array([[AXIS - 0.3, 0.001, 0.0], [AXIS - 0.3, -0.001, 0.0]])
+    above = np.array([[AXIS, 0.001, 0.3], [AXIS, -0.001, 0.3]])
     with pytest.raises(UserError, match="has a place"):
-        fit_window(bust, Chart((AXIS, 0.0, 0.0)), behind, None, START)
+        fit_window(bust, Chart((AXIS, 0.0, 0.0)), above, None, START)
 
 
 def test_the_back_of_a_tracked_head_widens_no_window(bust: Volume) -> None:

@@ -206,7 +206,7 @@ def fit_window(volume: Volume, chart: Chart, points: Array, vertices: Array | No
         raise UserError(
             "nothing of what the cameras see has a place on the layers",
             place="the starting volume",
-            expected=f"a subject around the origin, seen within {90 * params.azimuth_limit:.0f} degrees of its front",
+            expected="a subject around the origin",
             found="one that lies elsewhere",
             remedy="check `front` and `centre` of the subject (`facefolds doctor`), or add to train.start.centres",
         )
