@@ -103,7 +103,7 @@ def _fit(scene: Scene, params: ExplicitParams, log: Path) -> tuple[Trained, Surr
         trainer.psnr,
     )
     surroundings = Surroundings(cameras.scene.splits, cameras.gains, trainer.usual)
-    return Trained(model, spec, report, trainer.summary(spec)), surroundings
+    return Trained(model, spec, report, params, trainer.summary(spec)), surroundings
 
 
 def warnings_of(scene: Scene, fit: Fit) -> tuple[Fact, ...]:

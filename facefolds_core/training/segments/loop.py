@@ -153,7 +153,8 @@ class _Take:
             psnr,
         )
         report = replace(report, processor_seconds=round(report.processor_seconds + sum(self.used.seconds.values()), 2))
-        return Trained(RadianceManifolds(base.manifolds, textures).eval(), spec, report, self._summary(base))
+        model = RadianceManifolds(base.manifolds, textures).eval()
+        return Trained(model, spec, report, self.params, self._summary(base))
 
     def _summary(self, base: Base) -> dict[str, Any]:
         """`fit.json`: the base's, and how the take was dealt into segments."""
