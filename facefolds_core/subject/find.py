@@ -26,7 +26,7 @@ from facefolds_core.subject.drawing import draw, view_of
 from facefolds_core.subject.fit import fit_pictures
 from facefolds_core.subject.foreign import read_start
 from facefolds_core.subject.found import joined, no_subject, reference_frame
-from facefolds_core.subject.gaussians import GaussianParams
+from facefolds_core.subject.gaussians import GaussianMethod
 from facefolds_core.subject.hull import contradicted, looks_like
 from facefolds_core.subject.mattes import Key, Mattes, Source
 from facefolds_core.subject.splats import Splats
@@ -38,6 +38,11 @@ VIEWS = 24
 """Pictures that tell where the subject is: of a head that turns before fewer cameras, those of several frames."""
 LOOKED_AT = 40_000
 """Pixels of a camera by which its gain is told, at most."""
+
+DEFAULT_SUBJECT = SubjectParams()
+"""Of a subject that is found where no stage `subject` is: while `normalize` looks for poses in pictures, since a change
+of the section `subject` shall not make every capture be normalised again; and in a training of a scene that never went
+through the stages, as those of tests are."""
 
 
 @dataclass(frozen=True)
@@ -85,7 +90,7 @@ def find_subject(
     Raises:
         UserError: if nothing is found; see `read_start`.
     """
-    store, how, mattes, begun = scene.open_frames(), gaussian_params(params, scene), Mattes(scene, named), None
+    store, how, mattes, begun = scene.open_frames(), method_for(params, scene), Mattes(scene, named), None
     keys = [(c, k) for k in frames_looked_at(scene) for c in scene.indices("train") if (c, k) in store]
     training = set(scene.indices("train"))
     if start is not None or not all(mattes.known(key) for key in store if key[0] in training):
@@ -115,7 +120,7 @@ def _agreeing(scene: Scene, mattes: Mattes, keys: Sequence[Key]) -> list[Key]:
     return [key for key in keys if key[1] == reference_frame(scene)]
 
 
-def _fit_alone(scene: Scene, views: Sequence[View], how: GaussianParams, seed: int, begun: Splats | None) -> Splats:
+def _fit_alone(scene: Scene, views: Sequence[View], how: GaussianMethod, seed: int, begun: Splats | None) -> Splats:
     """Gaussians of the subject cut out of pictures, what floats apart left out."""
     cameras, opacities = [scene.camera_in_head(*view.key) for view in views], [view.opacity for view in views]
     colours, doubtful = [view.colours for view in views], [view.doubtful for view in views]
@@ -123,7 +128,7 @@ def _fit_alone(scene: Scene, views: Sequence[View], how: GaussianParams, seed: i
     return splats.part(joined(splats, scene))
 
 
-def fit_room(scene: Scene, frame: int, params: GaussianParams, seed: int = 0) -> Splats:
+def fit_room(scene: Scene, frame: int, params: GaussianMethod, seed: int = 0) -> Splats:
     """Gaussians of the training pictures of one frame, room included."""
     return fit_pictures(*pictures_of(scene, frame, scene.indices("train")), params, seed)
 
@@ -136,12 +141,10 @@ def pictures_of(scene: Scene, frame: int, cameras: Sequence[int]) -> tuple[list[
     return [scene.camera_in_head(i, frame) for i in there], pictures
 
 
-def gaussian_params(params: SubjectParams, scene: Scene) -> GaussianParams:
+def method_for(params: SubjectParams, scene: Scene) -> GaussianMethod:
     """How they are fitted."""
-    own = GaussianParams()
-    names = ("iterations", "fewest", "most")
-    found = replace(own, **{name: getattr(params, name) for name in names})
-    return found if scene.radius is None else replace(found, ball=scene.radius)
+    ball = GaussianMethod.ball if scene.radius is None else scene.radius
+    return GaussianMethod(iterations=params.iterations, fewest=params.fewest, most=params.most, ball=ball)
 
 
 def _views(scene: Scene, mattes: Mattes, keys: Sequence[Key]) -> list[View]:
@@ -222,7 +225,7 @@ def subject_in(scene: Scene) -> FoundSubject:
     return read_found(path, len(scene.indices("train")))
 
 
-def _body(scene: Scene, how: GaussianParams, seed: int, start: Path | None) -> Body:
+def _body(scene: Scene, how: GaussianMethod, seed: int, start: Path | None) -> Body:
     """The subject among Gaussians of the whole scene: of those that poses were found with, if there are some."""
     known, frame = scene.folder / BODY, reference_frame(scene)
     if start is None and is_there(known):

@@ -13,7 +13,7 @@ from facefolds_core.geometry.cameras import Camera
 from facefolds_core.kernels.adam import corrections, decays
 from facefolds_core.subject.adam_kernel import adam_step
 from facefolds_core.subject.drawing import View, differentiate, draw, view_of
-from facefolds_core.subject.gaussians import GaussianParams
+from facefolds_core.subject.gaussians import GaussianMethod
 from facefolds_core.subject.loss import picture_loss
 from facefolds_core.subject.seeds import seeds
 from facefolds_core.subject.splats import COLOUR, COLUMNS, MEAN, OPACITY, SCALE, SHINE, TURN, Splats, longest_axes
@@ -80,7 +80,7 @@ class Target:
 def fit_pictures(
     cameras: Sequence[Camera],
     pictures: Sequence[Array],
-    params: GaussianParams,
+    params: GaussianMethod,
     seed: int = 0,
     opacities: Sequence[Array] | None = None,
     begun: Splats | None = None,
@@ -132,7 +132,7 @@ def improve(
     state: State,
     target: Target,
     behind: Array,
-    params: GaussianParams,
+    params: GaussianMethod,
     done: float,
     before: int,
     random: np.random.Generator,
@@ -158,7 +158,7 @@ def improve(
     adam_step(state.values, state.first, state.second, gradient, seen, rates, correct, decays(BETAS))
 
 
-def thinned(state: State, params: GaussianParams) -> State:
+def thinned(state: State, params: GaussianMethod) -> State:
     """Without those that are hardly there."""
     kept = state.values[:, OPACITY] > np.log(params.faintest / (1 - params.faintest))
     kept &= np.isfinite(state.values).all(1)
@@ -213,7 +213,7 @@ def _smaller(image: Array, width: int, height: int) -> Array:
     return np.asarray(cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA), np.float32)
 
 
-def _rates(params: GaussianParams, done: float) -> Array:
+def _rates(params: GaussianMethod, done: float) -> Array:
     """(COLUMNS,) of Adam."""
     rates = np.empty(COLUMNS, np.float32)
     first, last = params.rate_mean

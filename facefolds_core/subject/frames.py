@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,15 +11,15 @@ from scipy.spatial import cKDTree
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.subject.drawing import differentiate, draw
 from facefolds_core.subject.fit import State, Target, improve, target_of
-from facefolds_core.subject.gaussians import GaussianParams
+from facefolds_core.subject.gaussians import GaussianMethod
 from facefolds_core.subject.splats import COLOUR, MEAN, Splats
 
 Array = NDArray[np.float32]
 
 STEPS = 64
 """Of a frame, on one picture each."""
-RATE_COLOUR = 0.015
-"""Adam's, of colours: in so few steps they must come from skin to the white of an eye."""
+METHOD = GaussianMethod(rate_colour=0.015)
+"""Colours move faster than those of a start: in so few steps they must come from skin to the white of an eye."""
 RIDE = 0.03
 """Gaussians so far off a tracked mesh, units, stay where they are: a mesh knows no hair. Nearer ones ride in part."""
 CHANGED = 0.02
@@ -86,10 +85,9 @@ def changed_to(splats: Splats, usual: Array, targets: Sequence[Target], seed: in
     chosen = mean_errors(splats, targets) - usual > CHANGED
     if not chosen.any():
         return splats
-    params = replace(GaussianParams(), rate_colour=RATE_COLOUR)
     random, state = np.random.default_rng(seed), State.of(splats.values.copy())
     order = np.concatenate([random.permutation(len(targets)) for _ in range(-(-STEPS // len(targets)))])
     for step, which in enumerate(order[:STEPS]):
         behind = random.random(3, np.float32)
-        improve(state, targets[which], behind, params, step / STEPS, step, random, chosen)
+        improve(state, targets[which], behind, METHOD, step / STEPS, step, random, chosen)
     return Splats(state.values, splats.background)

@@ -28,9 +28,9 @@ from facefolds_core.files.writing import atomic_file
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.geometry.track import Track, own_track
-from facefolds_core.params import NormalizeParams, SubjectParams
+from facefolds_core.params import NormalizeParams
 from facefolds_core.progress import progress
-from facefolds_core.subject.find import find_subject
+from facefolds_core.subject.find import DEFAULT_SUBJECT, find_subject
 from facefolds_core.subject.foreign import moved
 from facefolds_core.subject.found import reference_frame
 from facefolds_core.subject.storage import BODY, Body, write_body
@@ -90,7 +90,7 @@ def find_track(scene: Scene) -> Found:
     Raises:
         UserError: if the cameras do not look at one place, or nothing stands out from the background.
     """
-    subject, mattes = find_subject(scene, SubjectParams())
+    subject, mattes = find_subject(scene, DEFAULT_SUBJECT)
     volume, reference = volume_of(subject.splats), reference_frame(scene)
     cameras = [scene.cameras[i] for i in scene.indices("train")]
     points = weighted([surface_points(volume, camera) for camera in cameras])

@@ -19,7 +19,7 @@ from facefolds_core.params import ReflectionParams
 from facefolds_core.scoring.model_view import ModelView
 from facefolds_core.training.explicit.gloss import GlossFit
 from facefolds_core.training.explicit.loop import fit_explicit
-from facefolds_core.training.explicit.reflection import GlossParams
+from facefolds_core.training.explicit.reflection import GlossMethod
 from facefolds_core.training.explicit.reflection_maps import Maps, Seen, surface_normals
 from facefolds_core.training.explicit.state import TextureState
 from facefolds_core.training.explicit.views import StillRays, trace_views
@@ -73,7 +73,7 @@ def test_the_rays_of_a_fit_are_every_so_many_th_of_all_frames_together(scene: Sc
     state = TextureState((8, 8), 3, 6, torch.full((2, 2, 3), 0.5), params())
     state.layers[0] = 4 * torch.randn(state.layers[0].shape, generator=torch.Generator().manual_seed(0))
     fits = [
-        GlossFit(layers().chart, WINDOW, ReflectionParams(), turns, GlossParams(rays=most, moving_frames=5))
+        GlossFit(layers().chart, WINDOW, ReflectionParams(), turns, GlossMethod(rays=most, moving_frames=5))
         for most in (10**6, 100)
     ]
     every, some = (fit.look(state, source, Noise()) for fit in fits)

@@ -18,12 +18,11 @@ from facefolds_core.model.reflection import Reflection, ReflectionShape
 from facefolds_core.params import ReflectionParams
 from facefolds_core.training.explicit.gloss import GlossFit
 from facefolds_core.training.explicit.reflection import (
-    GlossParams,
+    GlossMethod,
     centred,
     fit_maps,
     gain_on_cameras,
     grounded,
-    smoothed,
 )
 from facefolds_core.training.explicit.reflection_kernel import look, normal_equations
 from facefolds_core.training.explicit.reflection_maps import (
@@ -41,7 +40,7 @@ from tests.training.test_explicit_kernels import random_cut
 
 WINDOW = (-0.5, 0.4, -0.3, 0.6)
 KEYS = ReflectionParams(enabled=True, texels=8, environment_texels=8)
-PARAMS = GlossParams()
+PARAMS = GlossMethod()
 
 
 def _random_maps(seed: int = 0, shape: tuple[int, int] = (8, 8)) -> Maps:
@@ -182,8 +181,8 @@ def test_a_smoother_one_is_asked_for_where_little_is_gained(
     gloss.maps, gloss._normals = START, START.surface
     state = SimpleNamespace(shine=np.ones((3, 3), np.float32))
 
-    def gain(_: Seen, __: Maps, asked: GlossParams) -> float:
-        return fine if asked == PARAMS else smooth
+    def gain(_: Seen, __: Maps, ___: GlossMethod, smoother: float = 1.0) -> float:
+        return fine if smoother == 1 else smooth
 
     with patch("facefolds_core.training.explicit.gloss.gain_on_cameras", gain):
         found = gloss._decide(cast(Any, state), seen)
@@ -194,8 +193,8 @@ def test_a_smoother_one_is_asked_for_where_little_is_gained(
     elif kind == "no_reflection":
         assert gloss.maps is None and len(state.shine) == 0
     else:
-        params = smoothed(PARAMS, 10.0)
-        expected = centred(grounded(fit_maps(seen, START, PARAMS.first_rounds, params)), seen, params)
+        fitted = grounded(fit_maps(seen, START, PARAMS.first_rounds, PARAMS, 10.0))
+        expected = centred(fitted, seen, PARAMS, 10.0)
         assert gloss.maps is not None and len(state.shine) == len(seen.st)
         for field in fields(Maps):
             np.testing.assert_allclose(getattr(gloss.maps, field.name), getattr(expected, field.name), atol=1e-6)

@@ -19,12 +19,11 @@ from facefolds_core.subject.outline import grid_shape
 from facefolds_core.training.explicit.plan import Level
 from facefolds_core.training.explicit.reflection import (
     GLOSS,
-    GlossParams,
+    GlossMethod,
     centred,
     fit_maps,
     gain_on_cameras,
     grounded,
-    smoothed,
 )
 from facefolds_core.training.explicit.reflection_maps import Maps, Seen, surface_normals
 from facefolds_core.training.explicit.state import TextureState
@@ -52,7 +51,7 @@ class GlossFit:
         window: Window,
         params: ReflectionParams,
         poses: Track | None,
-        how: GlossParams = GLOSS,
+        how: GlossMethod = GLOSS,
         photographed: int | None = None,
     ) -> None:
         self._photographed = photographed
@@ -111,10 +110,9 @@ class GlossFit:
         start = Maps.blank(self._normals, self.params) if first else self.maps
         assert start is not None
         rounds = self.how.first_rounds if first else self.how.rounds
-        how = smoothed(self.how, self.smoother)
-        maps = grounded(fit_maps(used, start, rounds, how))
+        maps = grounded(fit_maps(used, start, rounds, self.how, self.smoother))
         # Textures that are still trained would follow an offset that takes up what they leave over.
-        self.maps = maps if done else centred(maps, used, how)
+        self.maps = maps if done else centred(maps, used, self.how, self.smoother)
         self._shine(state, seen)
 
     def _decide(self, state: TextureState, seen: Seen) -> Fact:
@@ -124,7 +122,7 @@ class GlossFit:
         start, used, least = Maps.blank(self._normals, self.params), self._used(seen), self.how.min_gain
         gain = smooth = gain_on_cameras(used, start, self.how)
         if gain < self.how.sure_gain:
-            smooth = gain_on_cameras(used, start, smoothed(self.how, self.how.smoother))
+            smooth = gain_on_cameras(used, start, self.how, self.how.smoother)
         if gain >= max(least, smooth):
             return fact("reflection", gain=gain, least=least)
         begun, self.maps, state.shine = self.maps is not None, None, np.zeros((0, 3), np.float32)
