@@ -25,9 +25,12 @@ from facefolds_core.rendering.raster import cast_layers
 from facefolds_core.rendering.reference import Hits, Texture
 from facefolds_core.spacing import spread
 
+MOST_SHOWN = 0.95
+"""Quantile of what shows that is taken for what shows most: what a camera sees from very near is no measure."""
+
 LEAST = 0.01
-"""What shows less than this share of what shows most (the 95th percentile) counts as that much: someone may look from
-where no camera stood."""
+"""What shows less than this share of what shows most counts as that much: someone may look from where no camera
+stood."""
 
 CAMERAS = 24
 """Training cameras that are looked through, evenly spread."""
@@ -111,7 +114,7 @@ def offsets(weights: Weights, strength: float) -> NDArray[np.int64]:
     """Steps of the quantiser for each macroblock, about none in the (geometric) mean of what shows."""
     if not (weights > 0).any():
         return np.zeros(weights.shape, np.int64)
-    floor = LEAST * float(np.quantile(weights[weights > 0], 0.95))
+    floor = LEAST * float(np.quantile(weights[weights > 0], MOST_SHOWN))
     logs = np.log2(np.maximum(weights, floor))
     steps = -strength * (logs - logs[weights > floor].mean())
     return np.asarray(np.clip(np.rint(steps), -QUANTISERS, QUANTISERS), np.int64)

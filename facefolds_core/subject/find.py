@@ -39,6 +39,9 @@ VIEWS = 24
 LOOKED_AT = 40_000
 """Pixels of a camera by which its gain is told, at most."""
 
+SURE_OPACITY = 0.99
+"""Pixels that are as opaque are the subject's alone, and tell a camera's gain."""
+
 DEFAULT_SUBJECT = SubjectParams()
 """Of a subject that is found where no stage `subject` is: while `normalize` looks for poses in pictures, since a change
 of the section `subject` shall not make every capture be normalised again; and in a training of a scene that never went
@@ -183,7 +186,7 @@ def judged(scene: Scene, splats: Splats, views: Sequence[View]) -> tuple[CameraF
     for view in views:
         rgb, light = draw(splats.values, view_of(scene.camera_in_head(*view.key))).picture()
         squares.append(float(np.square(rgb - view.colours).mean()))
-        sure = np.flatnonzero((view.opacity > 0.99).reshape(-1))
+        sure = np.flatnonzero((view.opacity > SURE_OPACITY).reshape(-1))
         sure = sure[:: max(1, len(sure) // LOOKED_AT)]
         colours, seen = (image.reshape(-1, 3)[sure] for image in (rgb, view.colours))
         camera = np.full(len(sure), train.index(view.key[0]), np.int32)

@@ -58,6 +58,9 @@ MIN_OPACITY = 0.9
 NEARER = 0.25
 """Share of the points that are nearer to the cameras' common centre than one standard deviation of their weight."""
 
+EXTENT = (0.01, 0.99)
+"""Quantiles of the points' coordinates between which the subject extends: single points that float do not count."""
+
 MIN_LIKENESS = 0.6
 """A frame is refused, and its pose bridged, if it correlates with the reference less than this share of the median
 frame."""
@@ -104,7 +107,7 @@ def find_track(scene: Scene) -> Found:
     cloud = np.concatenate([one.positions for one in points])
     middle = np.average(cloud, axis=0, weights=np.concatenate([one.weight for one in points]))
     track = own_track(poses, np.array([pose.apply(middle) for pose in poses]))
-    size = float(np.ptp(np.quantile(cloud, [0.01, 0.99], axis=0), axis=0).max())
+    size = float(np.ptp(np.quantile(cloud, EXTENT, axis=0), axis=0).max())
     shift = max(float(np.linalg.norm(track.at(k).apply(middle) - middle)) for k in range(len(track))) / size
     facts = (fact("poses_refused", frames=[scene.frame_ids[k] for k in refused]),) if refused else ()
     return Found(track, float(track.degrees().max()), shift, likeness, facts, mattes.body)

@@ -25,6 +25,9 @@ Array = NDArray[np.float32]
 AT_ONCE = 1 << 20
 """Rays that are looked at together: bounds the memory."""
 
+CLEAR = 0.1
+"""A ray that is less opaque shows no place: the mean of where it meets the layers is mostly what noise there is."""
+
 
 @dataclass(frozen=True)
 class Seen:
@@ -71,7 +74,7 @@ class Seen:
 
     def filled(self, views: Views) -> Seen:
         """The same rays; those that are clear, and show no place, are taken to reflect at the layer in the middle."""
-        return replace(self, st=np.where(self.opacity[:, None] < 0.1, Seen.middle(views).st, self.st))
+        return replace(self, st=np.where(self.opacity[:, None] < CLEAR, Seen.middle(views).st, self.st))
 
     @classmethod
     def together(cls, parts: Sequence[Seen]) -> Seen:
