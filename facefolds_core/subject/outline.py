@@ -117,8 +117,8 @@ def window_uv(window: Window, rows: int, columns: int) -> Array:
     return np.stack(np.meshgrid(u, v, indexing="ij"), -1)
 
 
-def texel_uv(window: Window, rows: int, columns: int) -> Array:
-    """(rows, columns, 2) of the middles of a texture's texels."""
+def texel_middles(window: Window, rows: int, columns: int) -> Array:
+    """(rows, columns, 2) of the middles of a texture's texels: `sphere_uv.texel_uv`, which rounds in another order."""
     u = window[1] + (window[0] - window[1]) * (np.arange(rows) + 0.5) / rows
     v = window[2] + (window[3] - window[2]) * (np.arange(columns) + 0.5) / columns
     return np.stack(np.meshgrid(u, v, indexing="ij"), -1)

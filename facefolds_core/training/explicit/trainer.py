@@ -18,7 +18,7 @@ from facefolds_core.model.radial import RadialManifolds
 from facefolds_core.model.radiance import RadianceManifolds
 from facefolds_core.model.storage import ExplicitSpec
 from facefolds_core.params import ExplicitParams
-from facefolds_core.subject.outline import texel_uv
+from facefolds_core.subject.outline import texel_middles
 from facefolds_core.subject.volume import Volume
 from facefolds_core.training.explicit.cameras import CameraChoice
 from facefolds_core.training.explicit.fit import Fit, least_middle, recentre, volume_in
@@ -149,7 +149,7 @@ class Trainer:
         with on_one_thread():
             nodes = self.manifolds().radii().detach().permute(2, 0, 1)[None]
             radii = torch.nn.functional.interpolate(nodes, size=shape, mode="bilinear", align_corners=False)
-        places, uv = radii[0].permute(1, 2, 0).double().numpy(), texel_uv(self.fit.window, *shape)
+        places, uv = radii[0].permute(1, 2, 0).double().numpy(), texel_middles(self.fit.window, *shape)
         flat = shape[0] * shape[1], places.shape[-1]
 
         def held(volume: Volume) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
