@@ -57,11 +57,11 @@ def regions_of(content: LevelContent, cameras: Sequence[Camera], params: Attenti
     return tuple(merged(offsets(weights, params.strength)))
 
 
-View = tuple[Hits, float]
+RayHits = tuple[Hits, float]
 """Where chosen rays of a camera hit the layers, and how many pixels that do stand for each."""
 
 
-def views_of(content: LevelContent, cameras: Sequence[Camera]) -> list[View]:
+def views_of(content: LevelContent, cameras: Sequence[Camera]) -> list[RayHits]:
     chosen = spread(cameras, CAMERAS)
     meshes, rng, views = [layer.mesh for layer in content.layers], np.random.default_rng(0), []
     for camera in chosen:
@@ -71,7 +71,7 @@ def views_of(content: LevelContent, cameras: Sequence[Camera]) -> list[View]:
     return views
 
 
-def block_weights(content: LevelContent, views: Sequence[View], frames: Sequence[int]) -> Weights:
+def block_weights(content: LevelContent, views: Sequence[RayHits], frames: Sequence[int]) -> Weights:
     """W of each macroblock: the greatest over some frames, of the sum over the pixels of some views."""
     layout = content.layout
     blocks = np.zeros((layout.height // MACROBLOCK, layout.width // MACROBLOCK))

@@ -49,7 +49,7 @@ through the stages, as those of tests are."""
 
 
 @dataclass(frozen=True)
-class View:
+class CutPicture:
     """A training picture and the subject in it.
 
     Attributes:
@@ -57,7 +57,7 @@ class View:
         colours: (H, W, 3) times opacity.
         opacity: (H, W).
         source: whence its matte is.
-        doubtful: (H, W, 4) where its opacity may be wrong, see `fit.Target`; None where nothing is doubted.
+        doubtful: (H, W, 4) where its opacity may be wrong, see `fit.TargetPicture`; None where nothing is doubted.
     """
 
     key: Key
@@ -123,7 +123,9 @@ def _agreeing(scene: Scene, mattes: Mattes, keys: Sequence[Key]) -> list[Key]:
     return [key for key in keys if key[1] == reference_frame(scene)]
 
 
-def _fit_alone(scene: Scene, views: Sequence[View], how: GaussianMethod, seed: int, begun: Splats | None) -> Splats:
+def _fit_alone(
+    scene: Scene, views: Sequence[CutPicture], how: GaussianMethod, seed: int, begun: Splats | None
+) -> Splats:
     """Gaussians of the subject cut out of pictures, what floats apart left out."""
     cameras, opacities = [scene.camera_in_head(*view.key) for view in views], [view.opacity for view in views]
     colours, doubtful = [view.colours for view in views], [view.doubtful for view in views]
@@ -150,16 +152,16 @@ def method_for(params: SubjectParams, scene: Scene) -> GaussianMethod:
     return GaussianMethod(iterations=params.iterations, fewest=params.fewest, most=params.most, ball=ball)
 
 
-def _views(scene: Scene, mattes: Mattes, keys: Sequence[Key]) -> list[View]:
+def _views(scene: Scene, mattes: Mattes, keys: Sequence[Key]) -> list[CutPicture]:
     """Training pictures that agree, with the subject cut out of them."""
     found = [(key, mattes.of(key)) for key in _agreeing(scene, mattes, keys)]
-    return [View(key, *mattes.cut(key, matte), matte.source) for key, matte in found]
+    return [CutPicture(key, *mattes.cut(key, matte), matte.source) for key, matte in found]
 
 
-def _doubted(scene: Scene, mattes: Mattes, views: Sequence[View], ball: float) -> list[View]:
+def _doubted(scene: Scene, mattes: Mattes, views: Sequence[CutPicture], ball: float) -> list[CutPicture]:
     """The views; what one shows beside a plate is doubted where all others of its frame contradict it and it looks like
     the subject nearby."""
-    found = list[View]()
+    found = list[CutPicture]()
     for frame in dict.fromkeys(view.key[1] for view in views):
         those = [view for view in views if view.key[1] == frame]
         if all(view.source != "plate" for view in those):
@@ -174,13 +176,13 @@ def _doubted(scene: Scene, mattes: Mattes, views: Sequence[View], ball: float) -
     return found
 
 
-def _in_doubt(view: View, picture: Array, against: NDArray[np.bool_]) -> View:
+def _in_doubt(view: CutPicture, picture: Array, against: NDArray[np.bool_]) -> CutPicture:
     """A view whose picture (H, W, 3) others contradict (H, W)."""
     doubted = np.dstack([picture, np.ones_like(view.opacity)])
     return replace(view, doubtful=doubted * (against & looks_like(picture, view.opacity))[..., None])
 
 
-def judged(scene: Scene, splats: Splats, views: Sequence[View]) -> tuple[CameraFit, float]:
+def judged(scene: Scene, splats: Splats, views: Sequence[CutPicture]) -> tuple[CameraFit, float]:
     """What single cameras do differently, and PSNR over the pictures, dB."""
     train, parts, squares = scene.indices("train"), list[tuple[Array, Array, Array, NDArray[np.int32]]](), []
     for view in views:

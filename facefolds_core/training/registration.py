@@ -36,7 +36,7 @@ from facefolds_core.subject.found import reference_frame
 from facefolds_core.subject.storage import BODY, Body, write_body
 from facefolds_core.subject.volume import Volume, volume_of
 from facefolds_core.system.spill import by_rows
-from facefolds_core.training.alignment import MIN_COSINE, Equations, Picture, Points, features, look_up, refined, unit
+from facefolds_core.training.alignment import MIN_COSINE, Equations, Features, Points, features, look_up, refined, unit
 
 Array = NDArray[np.float64]
 
@@ -195,7 +195,7 @@ def _deepened(
     seen = _seen(scene, points, reference, sigma)
     found, likeness = list(poses), np.ones(len(poses))
 
-    def shown(k: int) -> list[Picture]:
+    def shown(k: int) -> list[Features]:
         return [features(store.image(i, k), sigma) for i in indices]
 
     curvature, slope = 1e-9, 0.0

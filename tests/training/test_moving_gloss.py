@@ -20,7 +20,7 @@ from facefolds_core.scoring.model_view import ModelView
 from facefolds_core.training.explicit.gloss import GlossFit
 from facefolds_core.training.explicit.loop import fit_explicit
 from facefolds_core.training.explicit.reflection import GlossMethod
-from facefolds_core.training.explicit.reflection_maps import Maps, Seen, surface_normals
+from facefolds_core.training.explicit.reflection_maps import Maps, SeenRays, surface_normals
 from facefolds_core.training.explicit.state import TextureState
 from facefolds_core.training.explicit.views import StillRays, trace_views
 from tests.geometry.test_track import about
@@ -79,7 +79,7 @@ def test_the_rays_of_a_fit_are_every_so_many_th_of_all_frames_together(scene: Sc
     every, some = (fit.look(state, source, Noise()) for fit in fits)
     step = -(-len(every.st) // 100)
     assert step > 1 and len({turn.tobytes() for turn in some.turns}) == 5
-    for field in fields(Seen):
+    for field in fields(SeenRays):
         np.testing.assert_array_equal(getattr(some, field.name), getattr(every, field.name)[::step])
 
 
@@ -109,7 +109,7 @@ def test_rays_that_are_clear_reflect_in_the_middle(scene: Scene) -> None:
     """Not in the corner of the window, where a mean over no opacity lies."""
     source = rays(scene, share=150)
     views, _ = source.part(0, 0, 1)
-    seen = Seen.middle(views)
+    seen = SeenRays.middle(views)
     half = replace(seen, st=0 * seen.st + 0.25, opacity=np.linspace(0, 1, len(seen.st), dtype=np.float32))
     found = half.filled(views).st
     clear = half.opacity < 0.1

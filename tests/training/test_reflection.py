@@ -27,7 +27,7 @@ from facefolds_core.training.explicit.reflection import (
 from facefolds_core.training.explicit.reflection_kernel import look, normal_equations
 from facefolds_core.training.explicit.reflection_maps import (
     Maps,
-    Seen,
+    SeenRays,
     surface_normals,
     tangents,
     tilted,
@@ -65,9 +65,9 @@ def _rays(count: int) -> tuple[np.ndarray, np.ndarray]:
     return rng.random((count, 2), np.float32), along.astype(np.float32)
 
 
-def _looked(st: np.ndarray, along: np.ndarray, turns: np.ndarray | None = None) -> Seen:
+def _looked(st: np.ndarray, along: np.ndarray, turns: np.ndarray | None = None) -> SeenRays:
     """Opaque rays that show nothing."""
-    return Seen(np.zeros(len(st), np.int32), along, st, np.ones(len(st), np.float32), np.zeros_like(along), turns)
+    return SeenRays(np.zeros(len(st), np.int32), along, st, np.ones(len(st), np.float32), np.zeros_like(along), turns)
 
 
 def _turns(count: int) -> np.ndarray:
@@ -130,7 +130,7 @@ def test_normal_equations_are_those_of_a_dense_matrix() -> None:
     np.testing.assert_allclose(right, rows.T @ wish, atol=1e-4)
 
 
-def _seen(strength: float, turned: bool = False, maps: Maps = TRUTH) -> Seen:
+def _seen(strength: float, turned: bool = False, maps: Maps = TRUTH) -> SeenRays:
     """Rays of eight cameras whose photos show `strength` times a known reflection, its mean in the layers."""
     looked = _looked(*_rays(20_000), _turns(20_000) if turned else None)
     rng, count = np.random.default_rng(2), len(looked.st)
@@ -181,7 +181,7 @@ def test_a_smoother_one_is_asked_for_where_little_is_gained(
     gloss.maps, gloss._normals = START, START.surface
     state = SimpleNamespace(shine=np.ones((3, 3), np.float32))
 
-    def gain(_: Seen, __: Maps, ___: GlossMethod, smoother: float = 1.0) -> float:
+    def gain(_: SeenRays, __: Maps, ___: GlossMethod, smoother: float = 1.0) -> float:
         return fine if smoother == 1 else smooth
 
     with patch("facefolds_core.training.explicit.gloss.gain_on_cameras", gain):
@@ -248,5 +248,5 @@ def test_a_ray_reflects_at_the_layer_nearest_to_the_middle() -> None:
     codes[0, :] = 1 + np.arange(5)[:, None] * 1000
     codes[1, [0, 4]] = [[1, 65535], [65535, 1]]
     codes[2, 1:] = codes[0, 1:] * (np.arange(1, 5) != 2)[:, None]
-    st = Seen.middle(one_each(codes), np.eye(3, dtype=np.float32)).st
+    st = SeenRays.middle(one_each(codes), np.eye(3, dtype=np.float32)).st
     np.testing.assert_allclose(st, [[2000 / 65534] * 2, [0, 1], [1000 / 65534] * 2], atol=1e-6)

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from scipy.linalg import solveh_banded
 
 from facefolds_core.training.explicit.reflection_kernel import normal_equations
-from facefolds_core.training.explicit.reflection_maps import Array, Maps, Seen, values_at
+from facefolds_core.training.explicit.reflection_maps import Array, Maps, SeenRays, values_at
 
 TILT_STEP = 0.01
 """By which normals lean to find how the reflection follows them: under a tenth of a texel of the environment."""
@@ -71,7 +71,7 @@ class GlossMethod:
 GLOSS = GlossMethod()
 
 
-def fit_maps(seen: Seen, start: Maps, rounds: int, how: GlossMethod, smoother: float = 1.0) -> Maps:
+def fit_maps(seen: SeenRays, start: Maps, rounds: int, how: GlossMethod, smoother: float = 1.0) -> Maps:
     """Gloss, offset, environment and the tilt of the normals that explain the residuals; the surface is that of
     `start`.
 
@@ -104,7 +104,7 @@ def fit_maps(seen: Seen, start: Maps, rounds: int, how: GlossMethod, smoother: f
     return maps
 
 
-def _lean(maps: Maps, seen: Seen, wanted: Array, axis: int, how: GlossMethod) -> Maps:
+def _lean(maps: Maps, seen: SeenRays, wanted: Array, axis: int, how: GlossMethod) -> Maps:
     """The same with another tilt along one tangent: a Gauss-Newton step, kept within `max_tilt`."""
     step = np.zeros((1, 1, 2), np.float32)
     step[..., axis] = TILT_STEP
@@ -125,7 +125,7 @@ def grounded(maps: Maps) -> Maps:
     return replace(maps, environment=maps.environment - darkest, offset=maps.offset - maps.gloss[..., None] * darkest)
 
 
-def centred(maps: Maps, seen: Seen, how: GlossMethod, smoother: float = 1.0) -> Maps:
+def centred(maps: Maps, seen: SeenRays, how: GlossMethod, smoother: float = 1.0) -> Maps:
     """The same with the offset that leaves the mean over the rays at every place as it is without reflections."""
     light = values_at(maps.environment, maps.positions(seen)) * values_at(maps.gloss[..., None], seen.st)
     weight = seen.opacity**2
@@ -133,7 +133,7 @@ def centred(maps: Maps, seen: Seen, how: GlossMethod, smoother: float = 1.0) -> 
     return replace(maps, offset=offset)
 
 
-def gain_on_cameras(seen: Seen, start: Maps, how: GlossMethod, smoother: float = 1.0) -> float:
+def gain_on_cameras(seen: SeenRays, start: Maps, how: GlossMethod, smoother: float = 1.0) -> float:
     """dB that the reflection wins on rays of cameras that its fit did not see, each camera left out once."""
     before = after = 0.0
     for fold in range(how.folds):
