@@ -35,7 +35,7 @@ from facefolds_core.scoring.truths import Truths
 from facefolds_core.spacing import spread
 from facefolds_core.subject import drawing
 from facefolds_core.subject.fit import fit_pictures
-from facefolds_core.subject.gaussians import GaussianParams
+from facefolds_core.subject.gaussians import GaussianMethod
 from facefolds_core.subject.splats import Splats
 
 SPLAT_BYTES = 20
@@ -74,7 +74,7 @@ def splats_of(scene: Scene, frame: int, count: int) -> Splats:
         cameras.append(scene.camera_in_head(index, frame))
         pictures.append(np.asarray(cut_from(photo, opacity, plate), np.float32))
         opacities.append(np.asarray(opacity, np.float32))
-    return fit_pictures(cameras, pictures, replace(GaussianParams(), fewest=count, most=count), 0, opacities)
+    return fit_pictures(cameras, pictures, replace(GaussianMethod(), fewest=count, most=count), 0, opacities)
 
 
 def look_at_splats(scene: Scene, frames: list[int], count: int) -> Look:

@@ -31,7 +31,7 @@ from facefolds_core.subject.drawing import render
 from facefolds_core.subject.find import pictures_of
 from facefolds_core.subject.fit import fit_pictures
 from facefolds_core.subject.found import background
-from facefolds_core.subject.gaussians import GaussianParams
+from facefolds_core.subject.gaussians import GaussianMethod
 from facefolds_core.subject.mattes import Mattes
 from facefolds_core.subject.ply import write_ply
 from facefolds_core.subject.splats import Splats
@@ -73,7 +73,7 @@ def measure(name: str, scene: Scene, seen: bool, sheet: Path) -> str:
     """Fit, score, draw the sheet; one line of Markdown's table."""
     cameras, pictures = pictures_of(scene, 0, [*scene.indices("train"), *(scene.indices("holdout") if seen else [])])
     begun = time.perf_counter(), time.process_time()
-    splats = fit_pictures(cameras, pictures, GaussianParams())
+    splats = fit_pictures(cameras, pictures, GaussianMethod())
     fitted = time.perf_counter() - begun[0], time.process_time() - begun[1]
     write_ply(sheet.with_suffix(".ply"), splats)
     body = body_among(scene, splats, 0)

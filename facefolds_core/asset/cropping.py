@@ -31,7 +31,7 @@ DIRECTIONS = 128
 behind it."""
 
 
-class Textures(Protocol):
+class TextureFrames(Protocol):
     """Layered textures (a FrameStore): RGBA, straight alpha, R x R each."""
 
     def image(self, camera: int, frame: int, /) -> NDArray[np.uint8]:
@@ -62,7 +62,7 @@ class CroppedLayer:
 
 
 def crop_layers(
-    meshes: Sequence[TexturedMesh], windows: Sequence[Window], textures: Textures, frames: int, unit: int = 1
+    meshes: Sequence[TexturedMesh], windows: Sequence[Window], textures: TextureFrames, frames: int, unit: int = 1
 ) -> tuple[CroppedLayer, ...]:
     """The layers that show anything, outermost first.
 

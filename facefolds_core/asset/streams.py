@@ -35,7 +35,7 @@ _TIMES_OF_WRITING = re.compile(r"#EXT-X-PROGRAM-DATE-TIME:.*\n")
 
 
 @dataclass(frozen=True)
-class Track:
+class StreamSource:
     """What becomes one stream: a file with one track, its place among the tracks, and the name of the new file."""
 
     source: Path
@@ -61,11 +61,11 @@ def make_streams(
     """
     videos = [(level, video) for level in levels for video in level.texture.videos]
     tracks = [
-        Track(folder / video.file, index, _name(level, video), f"{level.switchable or level.name} {video.codec}")
+        StreamSource(folder / video.file, index, _name(level, video), f"{level.switchable or level.name} {video.codec}")
         for index, (level, video) in enumerate(videos)
     ]
     if audio is not None:
-        tracks.append(Track(folder / audio.file, len(tracks), "audio.mp4", "audio"))
+        tracks.append(StreamSource(folder / audio.file, len(tracks), "audio.mp4", "audio"))
     texture = levels[-1].texture
     with TemporaryDirectory(dir=folder) as scratch:
         ranges = _mux(Path(scratch), tracks, texture)
@@ -92,7 +92,7 @@ def _name(level: Level, video: Video) -> str:
     return f"{level.name}.mp4" if first else f"{level.name}_{video.codec}.mp4"
 
 
-def _mux(folder: Path, tracks: Sequence[Track], texture: Texture) -> dict[int, list[tuple[int, int]]]:
+def _mux(folder: Path, tracks: Sequence[StreamSource], texture: Texture) -> dict[int, list[tuple[int, int]]]:
     """Write all tracks' files, the DASH manifest and the playlists; returns (first, last byte) of each part of each."""
     groups = dict.fromkeys(track.group for track in tracks)
     sets = [",".join(str(track.index) for track in tracks if track.group == group) for group in groups]

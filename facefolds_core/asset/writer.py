@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from facefolds_core import __version__
 from facefolds_core.asset.codecs import CODECS, Codec, CodecName, VideoSettings
-from facefolds_core.asset.cropping import CroppedLayer, Textures
+from facefolds_core.asset.cropping import CroppedLayer, TextureFrames
 from facefolds_core.asset.draco import MeshSettings, encode_mesh
 from facefolds_core.asset.manifest import (
     Bounds,
@@ -96,7 +96,7 @@ class LevelContent:
     """
 
     layers: Sequence[CroppedLayer]
-    textures: Textures
+    textures: TextureFrames
     frames: int
     fps: float
     unit: int = 1

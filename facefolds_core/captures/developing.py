@@ -15,7 +15,7 @@ from facefolds_core.captures.capture import Capture, check_plate_size, wrong_siz
 from facefolds_core.captures.images import corrected_colour, display_colour, downsample, to_8bit
 from facefolds_core.captures.lens import Lens, undistort
 from facefolds_core.captures.picture import Picture, VideoFrame
-from facefolds_core.captures.videos import Channels, Video
+from facefolds_core.captures.videos import CameraVideo, Channels
 from facefolds_core.files.frame_store import Image
 from facefolds_core.params import NormalizeParams
 from facefolds_core.system.threads import in_order
@@ -108,7 +108,7 @@ def _developed(
     return in_order(work())
 
 
-def _video_of(negative: Negative) -> Video | None:
+def _video_of(negative: Negative) -> CameraVideo | None:
     return negative.picture.video if isinstance(negative.picture, VideoFrame) else None
 
 

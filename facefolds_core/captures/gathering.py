@@ -14,7 +14,7 @@ import numpy as np
 from facefolds_core.captures.capture import Capture, View, closest_rotation, frame_rate, select_frames
 from facefolds_core.captures.lens import make_lens
 from facefolds_core.captures.picture import FilePicture, Picture, VideoFrame
-from facefolds_core.captures.videos import Video, check_together
+from facefolds_core.captures.videos import CameraVideo, check_together
 from facefolds_core.errors import UserError
 from facefolds_core.facts import Fact, fact, shorten
 from facefolds_core.files.reading import is_folder
@@ -95,7 +95,7 @@ def footage(files: Mapping[str, Path], subject: Subject) -> tuple[dict[str, dict
     Returns:
         camera -> frame -> picture, and frames a second.
     """
-    videos = [Video(path, name) for name, path in files.items()]
+    videos = [CameraVideo(path, name) for name, path in files.items()]
     stop = subject.frames.stop if isinstance(subject.frames, FrameRange) else None
     count, rate = check_together(videos, stop)
     return {v.camera: {f"{i:06d}": VideoFrame(v, i) for i in range(count)} for v in videos}, float(rate)

@@ -19,7 +19,7 @@ import h5py
 import numpy as np
 
 from facefolds_core.captures.images import REMEDY, Image, opacity_of, rgb_of, unreadable
-from facefolds_core.captures.videos import Video
+from facefolds_core.captures.videos import CameraVideo
 from facefolds_core.errors import UserError
 from facefolds_core.files.pictures import FORMATS, DamagedPictureError, picture_size
 from facefolds_core.files.reading import LARGEST, check_regular, read_bytes
@@ -134,14 +134,14 @@ class Hdf5Picture(_Stored):
 
 @dataclass(frozen=True)
 class VideoFrame:
-    """A frame of a video. `Video.frames` reads many in one go; by itself, all before it are decoded, too.
+    """A frame of a video. `CameraVideo.frames` reads many in one go; by itself, all before it are decoded, too.
 
     Attributes:
         video: whose.
         index: its position, from 0.
     """
 
-    video: Video
+    video: CameraVideo
     index: int
 
     @property

@@ -5,6 +5,7 @@ A wrong centre, front or scale shows here at a glance, before minutes of trainin
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 
 import cv2
@@ -52,11 +53,15 @@ def draw_place(path: Path, scene: Scene, frames: FrameStore) -> None:
     chosen = spread(there, MOST)
     radius = REACH if scene.radius is None else scene.radius
     cells = [_cell(scene.cameras[i], frames.image(i, 0), radius) for i in chosen]
-    across = math.ceil(math.sqrt(len(cells) * cells[0].shape[0] / cells[0].shape[1] * 1.5))
-    blank = np.full_like(cells[0], 255)
-    rows = [cells[k : k + across] for k in range(0, len(cells), across)]
-    sheet = np.vstack([np.hstack([*row, *[blank] * (across - len(row))]) for row in rows])
-    Pillow.fromarray(sheet).save(path)
+    Pillow.fromarray(contact_sheet(cells)).save(path)
+
+
+def contact_sheet(tiles: Sequence[Image]) -> Image:
+    """(H, W, 3): tiles (h, w, 3) side by side and below each other."""
+    height, width = tiles[0].shape[:2]
+    across = math.ceil(math.sqrt(1.5 * len(tiles) * height / width))
+    whole = [*tiles, *([np.full_like(tiles[0], 255)] * (-len(tiles) % across))]
+    return np.vstack([np.hstack(whole[k : k + across]) for k in range(0, len(whole), across)])
 
 
 def _cell(camera: Camera, image: Image, radius: float) -> Image:

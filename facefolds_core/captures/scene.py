@@ -222,6 +222,18 @@ def _read_poses(value: Any) -> Track | None:
     return Track(numbers[:, :4].copy(), numbers[:, 4:].copy())
 
 
+def check_frames(what: str, frames: int, scene: Scene) -> None:
+    """Raises UserError unless an asset, or a model, has as many frames as the scene; `what` says which it is."""
+    if frames != scene.num_frames:
+        raise UserError(
+            f"the {what} and the scene have different numbers of frames",
+            file=scene.folder / "scene.json",
+            expected=f"{scene.num_frames} frames, as in the scene",
+            found=f"{frames} in the {what}",
+            remedy="run `dvc repro`, which makes both from the same scene",
+        )
+
+
 def read_scene(folder: str | Path) -> Scene:
     """Read a normalised scene.
 

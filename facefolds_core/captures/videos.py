@@ -40,7 +40,7 @@ _REMEDY = "copy the file again from its source, or take this camera out of the c
 
 
 @dataclass(frozen=True)
-class VideoFacts:
+class IndexFacts:
     """What a video's index says.
 
     Attributes:
@@ -57,7 +57,7 @@ class VideoFacts:
 
 
 @dataclass(frozen=True)
-class Video:
+class CameraVideo:
     """One camera's video.
 
     Attributes:
@@ -68,7 +68,7 @@ class Video:
     file: Path
     camera: str
 
-    def facts(self) -> VideoFacts:
+    def facts(self) -> IndexFacts:
         """Of its index, read once."""
         check_regular(self.file, _REMEDY, place=f"camera {self.camera}", missing="a video is missing")
         return _facts(self, self.file.stat().st_mtime_ns)
@@ -126,7 +126,7 @@ class Video:
         return UserError(message, file=self.file, place=place, expected=expected, found=found, remedy=remedy)
 
 
-def check_together(videos: Sequence[Video], most: int | None = None) -> tuple[int, Fraction]:
+def check_together(videos: Sequence[CameraVideo], most: int | None = None) -> tuple[int, Fraction]:
     """Number of frames and frames a second that all videos of a capture have in common.
 
     Args:
@@ -161,7 +161,7 @@ def check_together(videos: Sequence[Video], most: int | None = None) -> tuple[in
 
 
 @contextmanager
-def _opened(video: Video) -> Iterator[tuple[Any, Any]]:
+def _opened(video: CameraVideo) -> Iterator[tuple[Any, Any]]:
     """(container, its video stream); errors of FFmpeg while it is opened are the user's."""
     kind = CONTAINERS.get(video.file.suffix.lower())
     if kind is None:
@@ -180,7 +180,7 @@ def _opened(video: Video) -> Iterator[tuple[Any, Any]]:
 
 
 @lru_cache(maxsize=1024)
-def _facts(video: Video, _changed: int) -> VideoFacts:
+def _facts(video: CameraVideo, _changed: int) -> IndexFacts:
     with _opened(video) as (container, stream):
         _check_turn(video, container, stream)
         times, end = _index(video, container, stream)
@@ -206,10 +206,10 @@ def _facts(video: Video, _changed: int) -> VideoFacts:
         rate = rate.limit_denominator(1001)
         context = stream.codec_context
         start = stream.start_time if stream.start_time is not None else times[0]
-        return VideoFacts((context.width, context.height), len(times), rate, float(start * base))
+        return IndexFacts((context.width, context.height), len(times), rate, float(start * base))
 
 
-def _index(video: Video, container: Any, stream: Any) -> tuple[list[int], int]:
+def _index(video: CameraVideo, container: Any, stream: Any) -> tuple[list[int], int]:
     """Times of all frames, in order, in units of the stream's time base, and where the last one's bytes end.
 
     MP4 has a table of all frames; of other containers, all packets are read.
@@ -226,7 +226,7 @@ def _index(video: Video, container: Any, stream: Any) -> tuple[list[int], int]:
     return sorted(packet.pts for packet in packets), 0
 
 
-def _check_turn(video: Video, container: Any, stream: Any) -> None:
+def _check_turn(video: CameraVideo, container: Any, stream: Any) -> None:
     """Refuse a tag that turns the picture: K and width and height refer to what is stored, players show another."""
     stream.codec_context.thread_count = 1
     try:

@@ -13,6 +13,7 @@ from facefolds_core.files.paths import check_path_text, check_subject_name
 from facefolds_core.files.reading import is_there, read_text
 from facefolds_core.files.writing import write_json
 from facefolds_core.params import STAGE_SECTIONS, Overrides, Section, Subject, merged, section_of, user_error
+from facefolds_core.params.renamed import remedy_for
 
 
 class Params(Section):
@@ -79,7 +80,7 @@ def load_params(path: str | Path = "params.yaml") -> Params:
             file=path,
             place=brief(", ".join(brief(name) for name in unknown), 200),
             expected=", ".join(["subjects", *STAGE_SECTIONS]),
-            remedy="remove or rename them",
+            remedy=next(filter(None, map(remedy_for, map(str, unknown))), "remove or rename them"),
         )
     sections = {name: value.get(name) or {} for name in STAGE_SECTIONS}
     for name, section in sections.items():

@@ -68,7 +68,7 @@ def looks_of(scene: Scene) -> tuple[Split, list[tuple[Look, NDArray[np.uint8]]]]
 
 
 @dataclass(frozen=True)
-class Seen:
+class PhotoSample:
     """What a look shows through some meshes, at pixels drawn at random.
 
     Attributes:
@@ -91,7 +91,7 @@ def _seen(
     windows: Sequence[Window],
     reflection: ReflectionMaps | None,
     textures: FrameStore,
-) -> tuple[Split, list[Seen]]:
+) -> tuple[Split, list[PhotoSample]]:
     """Of the cameras of the split by which things are chosen."""
     split, looks = looks_of(scene)
     rng, layers = np.random.default_rng(0), sorted({layer for layer, _ in textures})
@@ -107,7 +107,7 @@ def _seen(
             added = reflected_colours(hits, camera, windows, reflection, to_room)
             shine = composite(hits, own, added=added)[0] - composite(hits, own)[0]
             photo = photo - shine.reshape(-1, 3)[pixels]
-        found.append(Seen(look, pixels, hits.at(pixels), own, photo))
+        found.append(PhotoSample(look, pixels, hits.at(pixels), own, photo))
     return split, found
 
 
@@ -116,12 +116,16 @@ def _cast(scene: Scene, look: Look, meshes: Sequence[TexturedMesh]) -> Hits:
     return cast_layers(camera, layers_at(meshes, scene.poses, k))
 
 
-Picture = tuple[NDArray[np.float32], NDArray[np.float32]]
+PixelValues = tuple[NDArray[np.float32], NDArray[np.float32]]
 """Colours (1, M, 3) and alpha (1, M) of chosen pixels."""
 
 
 def _least(
-    what: str, candidates: Sequence[int], pictures: Callable[[int], list[Picture]], split: Split, seen: Sequence[Seen]
+    what: str,
+    candidates: Sequence[int],
+    pictures: Callable[[int], list[PixelValues]],
+    split: Split,
+    seen: Sequence[PhotoSample],
 ) -> tuple[int, Fact]:
     """From the finest down to the first that is not good enough: the one before it, and what was measured. The finest
     where no pixel counts.
@@ -135,7 +139,7 @@ def _least(
     if not any(at.any() for at in counts):  # nothing says that less would do
         coarser = []
 
-    def decibels(found: Sequence[Picture], truth: Sequence[NDArray[Any]]) -> float:
+    def decibels(found: Sequence[PixelValues], truth: Sequence[NDArray[Any]]) -> float:
         parts = [(one[0][0] - other)[at] for one, other, at in zip(found, truth, counts, strict=True)]
         error = float(np.mean(np.concatenate(parts, dtype=np.float64) ** 2)) if sum(map(len, parts)) else 0.0
         return -10 * float(np.log10(max(error, 1e-10)))
@@ -202,7 +206,7 @@ def choose_meshes(
     scene = scene.with_torso(grids.torso)
     split, seen = _seen(scene, ladder[max(MESHES)], _windows(grids), grids.reflection, textures)
 
-    def pictures(candidate: int) -> list[Picture]:
+    def pictures(candidate: int) -> list[PixelValues]:
         return [composite(_cast(scene, s.look, ladder[candidate]).at(s.pixels), s.images) for s in seen]
 
     return _least("decimate.resolution", MESHES, pictures, split, seen)
@@ -221,7 +225,7 @@ def choose_texels(scene: Scene, meshes: Sequence[TexturedMesh], grids: Grids, te
     split, seen = _seen(scene, meshes, _windows(grids), grids.reflection, textures)
     images = {s.look[1]: s.images for s in seen}
 
-    def pictures(candidate: int) -> list[Picture]:
+    def pictures(candidate: int) -> list[PixelValues]:
         small = {k: [resample(image, candidate) for image in frame] for k, frame in images.items()}
         return [composite(s.hits, small[s.look[1]]) for s in seen]
 

@@ -42,18 +42,6 @@ Surfaces = Sheets | list[Surface]
 """Of all layers, outermost first: the sampled grids themselves, or triangle surfaces."""
 
 
-def check_frames(model: RadianceManifolds, scene: Scene, file: Path | None = None) -> None:
-    """Raises UserError if the model was trained on another number of frames; `file` is named."""
-    if model.num_frames != scene.num_frames:
-        raise UserError(
-            "the model and the scene do not belong together",
-            file=file,
-            expected=f"{scene.num_frames} frames, as in {scene.folder}",
-            found=f"{model.num_frames} frames",
-            remedy="run `dvc repro`, which trains again, or train on this scene",
-        )
-
-
 def sample_model(
     model: RadianceManifolds,
     cameras: Sequence[Camera],

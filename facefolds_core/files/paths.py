@@ -37,7 +37,7 @@ class SubjectFolders:
     capture = _Within("capture")  # capture: the embedded actor in the Multiface layout; others: only `source.json`
     scene = _Within("scene")  # normalize: the normalised scene (captures/scene.py)
     subject = _Within("subject")  # subject: who stands where (subject/folder.py)
-    model = _Within("model")  # train: `model.safetensors`, `model.json`, `training.json`
+    model = _Within("model")  # train: `model.safetensors`, `model.json`, `training.json`, `params.json`
     # train and later stages: no output of any, so that a later run takes over what it would make again
     checkpoints = _Within("checkpoints")
     training_log = _Within("training")  # train: dvclive's folder

@@ -23,6 +23,13 @@ MIN_SLOPE = 0.1
 STEP = 0.005
 """Distance between samples of the search, units: a twentieth of a nose."""
 
+DELTA = 1e-4
+"""Half of the distance over which the slope of r - rho along a ray is measured, units: far less than a node of a map,
+far more than what float32 tells apart."""
+
+BISECTIONS = 25
+"""Of `STEP`: what is left is less than float32 tells apart."""
+
 MARGIN = 0.01
 """The search ball reaches this far beyond the largest radius, units."""
 
@@ -178,17 +185,16 @@ class RadialManifolds(nn.Module):
         height, _ = self._heights(rho, points)
         if torch.is_grad_enabled():
             with torch.no_grad():
-                delta = 1e-4
-                ahead, _ = self._heights(rho, points + delta * directions[:, None])
-                behind, _ = self._heights(rho, points - delta * directions[:, None])
-                slope = (ahead - behind) / (2 * delta)
+                ahead, _ = self._heights(rho, points + DELTA * directions[:, None])
+                behind, _ = self._heights(rho, points - DELTA * directions[:, None])
+                slope = (ahead - behind) / (2 * DELTA)
                 slope = torch.where(slope < 0, slope.clamp(max=-MIN_SLOPE), slope.clamp(min=MIN_SLOPE))
             distance = torch.where(hit, distance - (height - height.detach()) / slope, distance)
             points = origins[:, None] + distance[..., None] * directions[:, None]
         return Crossings(points, distance, hit)
 
     def _search(self, rho: Tensor, origins: Tensor, directions: Tensor) -> tuple[Tensor, Tensor]:
-        """First sign change between samples `STEP` apart at most, then 25 bisections. [R, N] distance and hit."""
+        """First sign change between samples `STEP` apart at most, then `BISECTIONS`. [R, N] distance and hit."""
         front = self.window[2] >= -1 and self.window[3] <= 1
         near, far, valid = search_interval(origins, directions, self.centre, self.radius, front)
         samples = max(2, int(float((far - near).max()) / STEP) + 2)
@@ -201,7 +207,7 @@ class RadialManifolds(nn.Module):
         hit, first = ((above[:, 1:] != above[:, :-1]) & both).max(1)
         a, b = s.gather(1, first), s.gather(1, first + 1)
         start = above.gather(1, first[:, None]).squeeze(1)
-        for _ in range(25):
+        for _ in range(BISECTIONS):
             m = 0.5 * (a + b)
             height, _ = self._heights(rho, origins[:, None] + m[..., None] * directions[:, None])
             same = (height >= 0) == start

@@ -25,9 +25,12 @@ from facefolds_core.rendering.raster import cast_layers
 from facefolds_core.rendering.reference import Hits, Texture
 from facefolds_core.spacing import spread
 
+MOST_SHOWN = 0.95
+"""Quantile of what shows that is taken for what shows most: what a camera sees from very near is no measure."""
+
 LEAST = 0.01
-"""What shows less than this share of what shows most (the 95th percentile) counts as that much: someone may look from
-where no camera stood."""
+"""What shows less than this share of what shows most counts as that much: someone may look from where no camera
+stood."""
 
 CAMERAS = 24
 """Training cameras that are looked through, evenly spread."""
@@ -54,11 +57,11 @@ def regions_of(content: LevelContent, cameras: Sequence[Camera], params: Attenti
     return tuple(merged(offsets(weights, params.strength)))
 
 
-View = tuple[Hits, float]
+RayHits = tuple[Hits, float]
 """Where chosen rays of a camera hit the layers, and how many pixels that do stand for each."""
 
 
-def views_of(content: LevelContent, cameras: Sequence[Camera]) -> list[View]:
+def views_of(content: LevelContent, cameras: Sequence[Camera]) -> list[RayHits]:
     chosen = spread(cameras, CAMERAS)
     meshes, rng, views = [layer.mesh for layer in content.layers], np.random.default_rng(0), []
     for camera in chosen:
@@ -68,7 +71,7 @@ def views_of(content: LevelContent, cameras: Sequence[Camera]) -> list[View]:
     return views
 
 
-def block_weights(content: LevelContent, views: Sequence[View], frames: Sequence[int]) -> Weights:
+def block_weights(content: LevelContent, views: Sequence[RayHits], frames: Sequence[int]) -> Weights:
     """W of each macroblock: the greatest over some frames, of the sum over the pixels of some views."""
     layout = content.layout
     blocks = np.zeros((layout.height // MACROBLOCK, layout.width // MACROBLOCK))
@@ -111,7 +114,7 @@ def offsets(weights: Weights, strength: float) -> NDArray[np.int64]:
     """Steps of the quantiser for each macroblock, about none in the (geometric) mean of what shows."""
     if not (weights > 0).any():
         return np.zeros(weights.shape, np.int64)
-    floor = LEAST * float(np.quantile(weights[weights > 0], 0.95))
+    floor = LEAST * float(np.quantile(weights[weights > 0], MOST_SHOWN))
     logs = np.log2(np.maximum(weights, floor))
     steps = -strength * (logs - logs[weights > floor].mean())
     return np.asarray(np.clip(np.rint(steps), -QUANTISERS, QUANTISERS), np.int64)

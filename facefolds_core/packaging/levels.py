@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from facefolds_core.asset.cropping import Textures, crop_layers
+from facefolds_core.asset.cropping import TextureFrames, crop_layers
 from facefolds_core.asset.manifest import Level
 from facefolds_core.asset.writer import FULL, LevelContent
 from facefolds_core.export.textures import resample
@@ -41,7 +41,7 @@ class Resampled:
         most: so many are kept.
     """
 
-    def __init__(self, textures: Textures, size: int, most: int = MOST_KEPT) -> None:
+    def __init__(self, textures: TextureFrames, size: int, most: int = MOST_KEPT) -> None:
         self._image = lru_cache(most)(lambda layer, frame: resample(textures.image(layer, frame), size))
 
     def image(self, layer: int, frame: int, /) -> NDArray[np.uint8]:

@@ -71,8 +71,9 @@ class NormalizeParams(Section):
 
 
 class SubjectParams(Section):
-    """The subject is found once: Gaussians of one frame, and a matte of every picture. Mattes come from the user
-    (`subjects.NAME.mattes`), from the capture, from clean plates, or else from Gaussians and the pictures' colours."""
+    """The subject is found once: Gaussians of one frame, and every picture's matte. Mattes come from the user
+    (`subjects.NAME.mattes`), the capture, clean plates, or else Gaussians and colours. `normalize`, looking for poses,
+    takes the defaults."""
 
     iterations: Annotated[int, Field(ge=1, le=1_000_000)] = 2500
     """Steps in which Gaussians are fitted, a picture each."""

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from facefolds_core.captures.scene import read_scene
+from facefolds_core.captures.scene import check_frames, read_scene
 from facefolds_core.config.stages import read_stage, read_train
-from facefolds_core.export.steps import SAMPLED_VIEWS, check_frames, sample_model
+from facefolds_core.export.steps import SAMPLED_VIEWS, sample_model
 from facefolds_core.export.stores import write_grids
 from facefolds_core.files.paths import SubjectFolders
 from facefolds_core.files.writing import atomic_folder
@@ -17,7 +17,7 @@ def sample(folders: SubjectFolders) -> str:
     params = read_stage(SampleParams, folders.config)
     model = load_model(folders.model, device_of(read_train(folders.config)))
     scene = read_scene(folders.scene).with_torso(model.torso)
-    check_frames(model, scene, folders.model)
+    check_frames("model", model.num_frames, scene)
     with atomic_folder(folders.samples) as temporary:
         cameras = scene.views_of("train", SAMPLED_VIEWS)
         grids = sample_model(model, cameras, params, temporary)

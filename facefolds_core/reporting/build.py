@@ -43,7 +43,7 @@ MOST_FILM_BYTES = 8_000_000
 
 
 @dataclass(frozen=True)
-class Subject:
+class ReportedSubject:
     """All that the page is made of.
 
     Attributes:
@@ -73,14 +73,14 @@ def make_report(folders: SubjectFolders, player: Path | None = None) -> Path:
     return path
 
 
-def gather(folders: SubjectFolders, player: Path | None) -> Subject:
+def gather(folders: SubjectFolders, player: Path | None) -> ReportedSubject:
     facts = read_facts(folders)
     asset = read_asset(folders.asset)
     scene = read_scene(folders.scene) if (folders.scene / "scene.json").is_file() else None
-    return Subject(facts, asset, scene, folders.evaluation, player)
+    return ReportedSubject(facts, asset, scene, folders.evaluation, player)
 
 
-def render_page(subject: Subject, folder: str) -> str:
+def render_page(subject: ReportedSubject, folder: str) -> str:
     """The page's HTML.
 
     Args:
@@ -94,7 +94,7 @@ def render_page(subject: Subject, folder: str) -> str:
     return environment.get_template("report.html.j2").render(css=css, js=js, folder=folder, **context(subject))
 
 
-def context(subject: Subject) -> dict[str, Any]:
+def context(subject: ReportedSubject) -> dict[str, Any]:
     """What the template prints, section by section; empty where there is nothing to show."""
     facts, manifest, scene = subject.facts, subject.asset.manifest, subject.scene
     key = headline(facts.metrics)
@@ -125,7 +125,7 @@ def context(subject: Subject) -> dict[str, Any]:
     }
 
 
-def tiles(subject: Subject, key: str) -> list[dict[str, str]]:
+def tiles(subject: ReportedSubject, key: str) -> list[dict[str, str]]:
     """The figures at the head of the page: those that there are."""
     metrics = subject.facts.metrics
     asset, cost = metrics.get("asset", {}), metrics.get("cost", {})
@@ -146,7 +146,7 @@ def tiles(subject: Subject, key: str) -> list[dict[str, str]]:
     ]
 
 
-def worst(subject: Subject) -> dict[str, str] | None:
+def worst(subject: ReportedSubject) -> dict[str, str] | None:
     """Where the asset is worst, photo beside asset: a window, or where that is not known a picture."""
     path, known = subject.evaluation / WORST, subject.facts.metrics.get("worst_patch")
     if not path.is_file():
@@ -164,7 +164,7 @@ def worst(subject: Subject) -> dict[str, str] | None:
     return {"src": stored(path), "words": f"camera {camera}, frame {label}; {words.number(psnr)} dB {what}"}
 
 
-def bad_views(subject: Subject) -> list[dict[str, str]]:
+def bad_views(subject: ReportedSubject) -> list[dict[str, str]]:
     """Photo beside asset of the training cameras that `evaluate` warned of; those whose pictures are there."""
     there = set((subject.evaluation / "pictures").glob("*.png"))  # a name in a file may lead anywhere
     facts = [one for one in subject.facts.metrics.get("warnings", ()) if isinstance(one, dict)]
@@ -173,7 +173,7 @@ def bad_views(subject: Subject) -> list[dict[str, str]]:
     return [{"camera": camera, "src": stored(path)} for camera, path in paths.items() if path in there]
 
 
-def films(subject: Subject) -> dict[str, Any]:
+def films(subject: ReportedSubject) -> dict[str, Any]:
     """Films of the held-out cameras, as many as the page has room for."""
     scene = subject.scene
     places = {camera.name: tables.degrees_from_front(camera) for camera in scene.cameras} if scene else {}
@@ -191,7 +191,7 @@ def films(subject: Subject) -> dict[str, Any]:
     return {"films": kept, "films_left": left, "film_size": both}
 
 
-def textures(subject: Subject) -> dict[str, Any]:
+def textures(subject: ReportedSubject) -> dict[str, Any]:
     """Every layer's texture of the middle frame."""
     asset = subject.asset
     frames, frame = subject.scene.frame_ids if subject.scene else (), asset.num_frames // 2

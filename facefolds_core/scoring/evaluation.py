@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from facefolds_core.asset import Asset
-from facefolds_core.captures.scene import Scene, Split
+from facefolds_core.captures.scene import Scene, Split, check_frames
 from facefolds_core.errors import UserError
 from facefolds_core.model import RadianceManifolds
 from facefolds_core.params import EvaluateParams
@@ -155,19 +155,6 @@ def rendered(view: PosedView, asset: Asset, frames: list[int]) -> Iterator[tuple
         yield k, images
 
 
-def check_frames(what: str, found: Asset | RadianceManifolds, scene: Scene) -> None:
-    """UserError unless an asset, or a model, has as many frames as the scene; `what` says which it is."""
-    if found.num_frames == scene.num_frames:
-        return
-    raise UserError(
-        f"the {what} and the scene have different numbers of frames",
-        file=scene.folder / "scene.json",
-        expected=f"{scene.num_frames} frames, as in the scene",
-        found=f"{found.num_frames} in the {what}",
-        remedy="run `dvc repro`, which makes both from the same scene",
-    )
-
-
 def _check(scene: Scene, model: RadianceManifolds, asset: Asset) -> None:
     if not scene.indices("holdout"):
         raise UserError(
@@ -177,8 +164,8 @@ def _check(scene: Scene, model: RadianceManifolds, asset: Asset) -> None:
             found=f"{len(scene.cameras)} cameras, all for training",
             remedy="name held-out cameras under subjects.<name>.holdout in params.yaml, or set {every: n} there",
         )
-    check_frames("model", model, scene)
-    check_frames("asset", asset, scene)
+    check_frames("model", model.num_frames, scene)
+    check_frames("asset", asset.num_frames, scene)
 
 
 def _check_finite(images: Mapping[str, Rendering], camera: str, frame: str) -> None:

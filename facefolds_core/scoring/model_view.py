@@ -46,7 +46,7 @@ class ModelView:
 
     def __init__(self, model: RadianceManifolds, camera: Camera, pose: Similarity | None = None) -> None:
         grids = isinstance(model.textures, GridTextures)
-        self._seen: _Grids | _Networks = (_Grids if grids else _Networks)(model, camera, pose)
+        self._seen: _GridView | _Networks = (_GridView if grids else _Networks)(model, camera, pose)
 
     @torch.no_grad()
     def render(self, time: float) -> Pictures:
@@ -54,7 +54,7 @@ class ModelView:
         return self._seen.render(time)
 
 
-class _Grids:
+class _GridView:
     """Texel grids: looked up as the asset's textures are."""
 
     def __init__(self, model: RadianceManifolds, camera: Camera, pose: Similarity | None) -> None:

@@ -16,7 +16,7 @@ Array = NDArray[np.float32]
 
 
 @dataclass(frozen=True)
-class View:
+class SplatCamera:
     """A camera as the kernels take it.
 
     Attributes:
@@ -37,12 +37,14 @@ class View:
         return self.tiles[1] * TILE[1], self.tiles[0] * TILE[0]
 
 
-def view_of(camera: Camera) -> View:
+def view_of(camera: Camera) -> SplatCamera:
     """A camera for the kernels."""
     K = camera.K
     rows = [*camera.rotation, camera.w2c[:, 3], [K[0, 0], K[1, 1], K[0, 1]], [K[0, 2], K[1, 2], 0.0]]
     size = camera.width, camera.height
-    return View(np.array(rows, np.float64), camera.centre, size, (-(-size[0] // TILE[0]), -(-size[1] // TILE[1])))
+    return SplatCamera(
+        np.array(rows, np.float64), camera.centre, size, (-(-size[0] // TILE[0]), -(-size[1] // TILE[1]))
+    )
 
 
 @dataclass(frozen=True)
@@ -58,7 +60,7 @@ class Drawing:
         light: (H, W) float32 transmittance, of whole tiles.
     """
 
-    view: View
+    view: SplatCamera
     plane: Array
     colours: Array
     first: NDArray[np.int64]
@@ -80,7 +82,7 @@ class Drawing:
         return np.moveaxis(self.rgb[:, :height, :width], 0, -1), self.light[:height, :width]
 
 
-def draw(values: Array, view: View) -> Drawing:
+def draw(values: Array, view: SplatCamera) -> Drawing:
     """Draw Gaussians (N, COLUMNS)."""
     count, (across, down) = len(values), view.tiles
     plane, tiles = np.zeros((count, PLANE), np.float32), np.empty((count, 4), np.int32)

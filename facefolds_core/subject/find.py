@@ -26,7 +26,7 @@ from facefolds_core.subject.drawing import draw, view_of
 from facefolds_core.subject.fit import fit_pictures
 from facefolds_core.subject.foreign import read_start
 from facefolds_core.subject.found import joined, no_subject, reference_frame
-from facefolds_core.subject.gaussians import GaussianParams
+from facefolds_core.subject.gaussians import GaussianMethod
 from facefolds_core.subject.hull import contradicted, looks_like
 from facefolds_core.subject.mattes import Key, Mattes, Source
 from facefolds_core.subject.splats import Splats
@@ -39,9 +39,17 @@ VIEWS = 24
 LOOKED_AT = 40_000
 """Pixels of a camera by which its gain is told, at most."""
 
+SURE_OPACITY = 0.99
+"""Pixels that are as opaque are the subject's alone, and tell a camera's gain."""
+
+DEFAULT_SUBJECT = SubjectParams()
+"""Of a subject that is found where no stage `subject` is: while `normalize` looks for poses in pictures, since a change
+of the section `subject` shall not make every capture be normalised again; and in a training of a scene that never went
+through the stages, as those of tests are."""
+
 
 @dataclass(frozen=True)
-class View:
+class CutPicture:
     """A training picture and the subject in it.
 
     Attributes:
@@ -49,7 +57,7 @@ class View:
         colours: (H, W, 3) times opacity.
         opacity: (H, W).
         source: whence its matte is.
-        doubtful: (H, W, 4) where its opacity may be wrong, see `fit.Target`; None where nothing is doubted.
+        doubtful: (H, W, 4) where its opacity may be wrong, see `fit.TargetPicture`; None where nothing is doubted.
     """
 
     key: Key
@@ -85,7 +93,7 @@ def find_subject(
     Raises:
         UserError: if nothing is found; see `read_start`.
     """
-    store, how, mattes, begun = scene.open_frames(), gaussian_params(params, scene), Mattes(scene, named), None
+    store, how, mattes, begun = scene.open_frames(), method_for(params, scene), Mattes(scene, named), None
     keys = [(c, k) for k in frames_looked_at(scene) for c in scene.indices("train") if (c, k) in store]
     training = set(scene.indices("train"))
     if start is not None or not all(mattes.known(key) for key in store if key[0] in training):
@@ -115,7 +123,9 @@ def _agreeing(scene: Scene, mattes: Mattes, keys: Sequence[Key]) -> list[Key]:
     return [key for key in keys if key[1] == reference_frame(scene)]
 
 
-def _fit_alone(scene: Scene, views: Sequence[View], how: GaussianParams, seed: int, begun: Splats | None) -> Splats:
+def _fit_alone(
+    scene: Scene, views: Sequence[CutPicture], how: GaussianMethod, seed: int, begun: Splats | None
+) -> Splats:
     """Gaussians of the subject cut out of pictures, what floats apart left out."""
     cameras, opacities = [scene.camera_in_head(*view.key) for view in views], [view.opacity for view in views]
     colours, doubtful = [view.colours for view in views], [view.doubtful for view in views]
@@ -123,7 +133,7 @@ def _fit_alone(scene: Scene, views: Sequence[View], how: GaussianParams, seed: i
     return splats.part(joined(splats, scene))
 
 
-def fit_room(scene: Scene, frame: int, params: GaussianParams, seed: int = 0) -> Splats:
+def fit_room(scene: Scene, frame: int, params: GaussianMethod, seed: int = 0) -> Splats:
     """Gaussians of the training pictures of one frame, room included."""
     return fit_pictures(*pictures_of(scene, frame, scene.indices("train")), params, seed)
 
@@ -136,24 +146,22 @@ def pictures_of(scene: Scene, frame: int, cameras: Sequence[int]) -> tuple[list[
     return [scene.camera_in_head(i, frame) for i in there], pictures
 
 
-def gaussian_params(params: SubjectParams, scene: Scene) -> GaussianParams:
+def method_for(params: SubjectParams, scene: Scene) -> GaussianMethod:
     """How they are fitted."""
-    own = GaussianParams()
-    names = ("iterations", "fewest", "most")
-    found = replace(own, **{name: getattr(params, name) for name in names})
-    return found if scene.radius is None else replace(found, ball=scene.radius)
+    ball = GaussianMethod.ball if scene.radius is None else scene.radius
+    return GaussianMethod(iterations=params.iterations, fewest=params.fewest, most=params.most, ball=ball)
 
 
-def _views(scene: Scene, mattes: Mattes, keys: Sequence[Key]) -> list[View]:
+def _views(scene: Scene, mattes: Mattes, keys: Sequence[Key]) -> list[CutPicture]:
     """Training pictures that agree, with the subject cut out of them."""
     found = [(key, mattes.of(key)) for key in _agreeing(scene, mattes, keys)]
-    return [View(key, *mattes.cut(key, matte), matte.source) for key, matte in found]
+    return [CutPicture(key, *mattes.cut(key, matte), matte.source) for key, matte in found]
 
 
-def _doubted(scene: Scene, mattes: Mattes, views: Sequence[View], ball: float) -> list[View]:
+def _doubted(scene: Scene, mattes: Mattes, views: Sequence[CutPicture], ball: float) -> list[CutPicture]:
     """The views; what one shows beside a plate is doubted where all others of its frame contradict it and it looks like
     the subject nearby."""
-    found = list[View]()
+    found = list[CutPicture]()
     for frame in dict.fromkeys(view.key[1] for view in views):
         those = [view for view in views if view.key[1] == frame]
         if all(view.source != "plate" for view in those):
@@ -168,19 +176,19 @@ def _doubted(scene: Scene, mattes: Mattes, views: Sequence[View], ball: float) -
     return found
 
 
-def _in_doubt(view: View, picture: Array, against: NDArray[np.bool_]) -> View:
+def _in_doubt(view: CutPicture, picture: Array, against: NDArray[np.bool_]) -> CutPicture:
     """A view whose picture (H, W, 3) others contradict (H, W)."""
     doubted = np.dstack([picture, np.ones_like(view.opacity)])
     return replace(view, doubtful=doubted * (against & looks_like(picture, view.opacity))[..., None])
 
 
-def judged(scene: Scene, splats: Splats, views: Sequence[View]) -> tuple[CameraFit, float]:
+def judged(scene: Scene, splats: Splats, views: Sequence[CutPicture]) -> tuple[CameraFit, float]:
     """What single cameras do differently, and PSNR over the pictures, dB."""
     train, parts, squares = scene.indices("train"), list[tuple[Array, Array, Array, NDArray[np.int32]]](), []
     for view in views:
         rgb, light = draw(splats.values, view_of(scene.camera_in_head(*view.key))).picture()
         squares.append(float(np.square(rgb - view.colours).mean()))
-        sure = np.flatnonzero((view.opacity > 0.99).reshape(-1))
+        sure = np.flatnonzero((view.opacity > SURE_OPACITY).reshape(-1))
         sure = sure[:: max(1, len(sure) // LOOKED_AT)]
         colours, seen = (image.reshape(-1, 3)[sure] for image in (rgb, view.colours))
         camera = np.full(len(sure), train.index(view.key[0]), np.int32)
@@ -222,7 +230,7 @@ def subject_in(scene: Scene) -> FoundSubject:
     return read_found(path, len(scene.indices("train")))
 
 
-def _body(scene: Scene, how: GaussianParams, seed: int, start: Path | None) -> Body:
+def _body(scene: Scene, how: GaussianMethod, seed: int, start: Path | None) -> Body:
     """The subject among Gaussians of the whole scene: of those that poses were found with, if there are some."""
     known, frame = scene.folder / BODY, reference_frame(scene)
     if start is None and is_there(known):

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.kernels.adam import corrections, decays
 from facefolds_core.subject.adam_kernel import adam_step
-from facefolds_core.subject.drawing import View, differentiate, draw, view_of
-from facefolds_core.subject.gaussians import GaussianParams
+from facefolds_core.subject.drawing import SplatCamera, differentiate, draw, view_of
+from facefolds_core.subject.gaussians import GaussianMethod
 from facefolds_core.subject.loss import picture_loss
 from facefolds_core.subject.seeds import seeds
 from facefolds_core.subject.splats import COLOUR, COLUMNS, MEAN, OPACITY, SCALE, SHINE, TURN, Splats, longest_axes
@@ -50,7 +50,7 @@ class State:
 
 
 @dataclass(frozen=True)
-class Target:
+class TargetPicture:
     """A training picture of one size, of whole tiles.
 
     Attributes:
@@ -61,7 +61,7 @@ class Target:
             times how doubtful it is.
     """
 
-    view: View
+    view: SplatCamera
     picture: Array
     opacity: Array | None = None
     doubtful: Array | None = None
@@ -80,7 +80,7 @@ class Target:
 def fit_pictures(
     cameras: Sequence[Camera],
     pictures: Sequence[Array],
-    params: GaussianParams,
+    params: GaussianMethod,
     seed: int = 0,
     opacities: Sequence[Array] | None = None,
     begun: Splats | None = None,
@@ -92,7 +92,7 @@ def fit_pictures(
         opacities: (H, W) in [0, 1] of the subject; its colours times opacity are the pictures then, and it is
             compared over a colour that changes with each step.
         begun: Gaussians to begin with; they get the last steps only, and stay as many.
-        doubtful: (H, W, 4) of a picture where its opacity may be wrong, or None; see `Target`.
+        doubtful: (H, W, 4) of a picture where its opacity may be wrong, or None; see `TargetPicture`.
     """
     random = np.random.default_rng(seed)
     pixels = sum(picture.shape[0] * picture.shape[1] for picture in pictures)
@@ -104,7 +104,7 @@ def fit_pictures(
     else:
         first, state = int((1 - params.again) * params.iterations), State.of(begun.values.copy())
     background = np.mean([picture.mean((0, 1)) for picture in pictures], 0).astype(np.float32)
-    targets: list[Target] = []
+    targets: list[TargetPicture] = []
     level, order = -1.0, np.arange(0)
     for step in range(first, params.iterations):
         done = step / params.iterations
@@ -130,9 +130,9 @@ def _over_grey(picture: Array, opacity: Array) -> Array:
 
 def improve(
     state: State,
-    target: Target,
+    target: TargetPicture,
     behind: Array,
-    params: GaussianParams,
+    params: GaussianMethod,
     done: float,
     before: int,
     random: np.random.Generator,
@@ -158,7 +158,7 @@ def improve(
     adam_step(state.values, state.first, state.second, gradient, seen, rates, correct, decays(BETAS))
 
 
-def thinned(state: State, params: GaussianParams) -> State:
+def thinned(state: State, params: GaussianMethod) -> State:
     """Without those that are hardly there."""
     kept = state.values[:, OPACITY] > np.log(params.faintest / (1 - params.faintest))
     kept &= np.isfinite(state.values).all(1)
@@ -193,8 +193,8 @@ def grown(state: State, wanted: int) -> State:
 
 def target_of(
     camera: Camera, picture: Array, opacity: Array | None, size: float, doubtful: Array | None = None
-) -> Target:
-    """A picture (H, W, 3) with its opacity (H, W), `size` times as large; doubtful (H, W, 4), see `Target`."""
+) -> TargetPicture:
+    """A picture (H, W, 3) with its opacity (H, W), `size` times as large; doubtful (H, W, 4), see `TargetPicture`."""
     width, height = max(8, round(camera.width * size)), max(8, round(camera.height * size))
     view = view_of(camera.resized(width, height))
 
@@ -204,16 +204,16 @@ def target_of(
         return whole
 
     if opacity is None:
-        return Target(view, padded(picture))
+        return TargetPicture(view, padded(picture))
     whole = padded(np.dstack([picture, opacity]))
-    return Target(view, whole[:3], whole[3], None if doubtful is None else padded(doubtful))
+    return TargetPicture(view, whole[:3], whole[3], None if doubtful is None else padded(doubtful))
 
 
 def _smaller(image: Array, width: int, height: int) -> Array:
     return np.asarray(cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA), np.float32)
 
 
-def _rates(params: GaussianParams, done: float) -> Array:
+def _rates(params: GaussianMethod, done: float) -> Array:
     """(COLUMNS,) of Adam."""
     rates = np.empty(COLUMNS, np.float32)
     first, last = params.rate_mean

@@ -9,8 +9,7 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +19,7 @@ from PIL import Image as Pillow
 
 from facefolds_core.captures.found_scene import GAUSSIANS, MATTES
 from facefolds_core.captures.given_mattes import given_mattes
+from facefolds_core.captures.place import contact_sheet
 from facefolds_core.captures.scene import Scene
 from facefolds_core.files.frame_store import Image, write_frames
 from facefolds_core.files.writing import atomic_folder, write_json
@@ -104,14 +104,6 @@ def _described(told: list[Told], found: FoundSubject) -> dict[str, Any]:
     mean = round(float(np.mean(known)), 5) if known else None
     start = {"gaussians": len(found.splats), "psnr": round(found.psnr, 3)}
     return {"version": 2, "start": start, "iou": mean, "pictures": told}
-
-
-def contact_sheet(tiles: Sequence[Image]) -> Image:
-    """(H, W, 3): tiles (h, w, 3) side by side and below each other."""
-    height, width = tiles[0].shape[:2]
-    across = math.ceil(math.sqrt(1.5 * len(tiles) * height / width))
-    whole = [*tiles, *([np.full_like(tiles[0], WHITE)] * (-len(tiles) % across))]
-    return np.vstack([np.hstack(whole[k : k + across]) for k in range(0, len(whole), across)])
 
 
 def tile(scene: Scene, key: Key, picture: Image, matte: Matte) -> Image:

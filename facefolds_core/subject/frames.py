@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,30 +10,30 @@ from scipy.spatial import cKDTree
 
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.subject.drawing import differentiate, draw
-from facefolds_core.subject.fit import State, Target, improve, target_of
-from facefolds_core.subject.gaussians import GaussianParams
+from facefolds_core.subject.fit import State, TargetPicture, improve, target_of
+from facefolds_core.subject.gaussians import GaussianMethod
 from facefolds_core.subject.splats import COLOUR, MEAN, Splats
 
 Array = NDArray[np.float32]
 
 STEPS = 64
 """Of a frame, on one picture each."""
-RATE_COLOUR = 0.015
-"""Adam's, of colours: in so few steps they must come from skin to the white of an eye."""
+METHOD = GaussianMethod(rate_colour=0.015)
+"""Colours move faster than those of a start: in so few steps they must come from skin to the white of an eye."""
 RIDE = 0.03
 """Gaussians so far off a tracked mesh, units, stay where they are: a mesh knows no hair. Nearer ones ride in part."""
 CHANGED = 0.02
 """A Gaussian changes in a frame if its pixels err by this much more than in the frame of the start."""
 
 
-def mean_errors(splats: Splats, targets: Sequence[Target]) -> Array:
+def mean_errors(splats: Splats, targets: Sequence[TargetPicture]) -> Array:
     """(N,) mean of |C - I| + |opacity's error| over the pixels that show a Gaussian, weighted as they show it; 0 of
     those that none shows."""
     sums, weights = shown_errors(splats, targets)
     return np.where(weights > 0, sums / np.maximum(weights, 1e-6), 0).astype(np.float32)
 
 
-def shown_errors(splats: Splats, targets: Sequence[Target]) -> tuple[Array, Array]:
+def shown_errors(splats: Splats, targets: Sequence[TargetPicture]) -> tuple[Array, Array]:
     """(N,) sums of these errors, and of their weights; of targets with their room, of colours alone."""
     sums, weights = np.zeros(len(splats), np.float32), np.zeros(len(splats), np.float32)
     for target in targets:
@@ -53,7 +52,7 @@ def shown_errors(splats: Splats, targets: Sequence[Target]) -> tuple[Array, Arra
     return sums, weights
 
 
-def targets_of(cameras: Sequence[Camera], cut: NDArray[np.uint8]) -> list[Target]:
+def targets_of(cameras: Sequence[Camera], cut: NDArray[np.uint8]) -> list[TargetPicture]:
     """Of cut-outs (C, H W, 4), RGBA with colours times opacity."""
     found = []
     for camera, flat in zip(cameras, cut, strict=True):
@@ -75,7 +74,7 @@ def ridden(splats: Splats, start: NDArray[np.float64], now: NDArray[np.float64])
     return Splats(values, splats.background)
 
 
-def changed_to(splats: Splats, usual: Array, targets: Sequence[Target], seed: int) -> Splats:
+def changed_to(splats: Splats, usual: Array, targets: Sequence[TargetPicture], seed: int) -> Splats:
     """The Gaussians as one frame's pictures show them; those that the pictures do not contradict stay as they are.
 
     Args:
@@ -86,10 +85,9 @@ def changed_to(splats: Splats, usual: Array, targets: Sequence[Target], seed: in
     chosen = mean_errors(splats, targets) - usual > CHANGED
     if not chosen.any():
         return splats
-    params = replace(GaussianParams(), rate_colour=RATE_COLOUR)
     random, state = np.random.default_rng(seed), State.of(splats.values.copy())
     order = np.concatenate([random.permutation(len(targets)) for _ in range(-(-STEPS // len(targets)))])
     for step, which in enumerate(order[:STEPS]):
         behind = random.random(3, np.float32)
-        improve(state, targets[which], behind, params, step / STEPS, step, random, chosen)
+        improve(state, targets[which], behind, METHOD, step / STEPS, step, random, chosen)
     return Splats(state.values, splats.background)

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
-class GaussianParams:
-    """Of `fit_pictures`.
+class GaussianMethod:
+    """Of `fit_pictures`: constants of the method, but for the three that the section `subject` has (`find.method_for`).
 
     Attributes:
         pixels: of all training pictures a Gaussian; there are `fewest` to `most` of them at the end.

@@ -58,7 +58,7 @@ def opacity_before(
     opacity, unknown = inside.astype(np.float32), unknown & ~inside
     colours, known = image.copy(), ~unknown
     away = np.ceil(np.asarray(ndimage.distance_transform_edt(~inside)))
-    subject = _Colours(colours, opacity)
+    subject = _NearbyColours(colours, opacity)
     for distance in np.unique(away[unknown]):
         ring = np.nonzero(unknown & (away == distance))
         mean, covariance = subject.around(ring)
@@ -78,7 +78,7 @@ def _blurred(values: Array, width: float) -> Array:
     return np.asarray(cv2.GaussianBlur(values, (0, 0), width), np.float32)
 
 
-class _Colours:
+class _NearbyColours:
     """Mean and covariance of the subject's colours around pixels, as far as these are known: by a Gaussian blur at half
     the size, where a wide one is the same.
 

@@ -28,9 +28,9 @@ from facefolds_core.subject.cut_out import (
     softened,
 )
 from facefolds_core.subject.drawing import draw, view_of
-from facefolds_core.subject.fit import Target, target_of
+from facefolds_core.subject.fit import TargetPicture, target_of
 from facefolds_core.subject.found import background, opacity_of, reference_frame
-from facefolds_core.subject.plates import Start, from_plate
+from facefolds_core.subject.plates import Expectation, from_plate
 from facefolds_core.subject.splats import Splats
 from facefolds_core.subject.standing import farthest_moved, if_still, in_frame, standing, torso_of
 from facefolds_core.subject.storage import Body
@@ -140,7 +140,7 @@ class Mattes:
     def _plated(self, key: Key) -> bool:
         return self._plates is not None and (key[0], 0) in self._plates
 
-    def _plain(self, key: Key, start: Callable[[Key], Start | None] = lambda _: None) -> Matte:
+    def _plain(self, key: Key, start: Callable[[Key], Expectation | None] = lambda _: None) -> Matte:
         """Of a picture for which no Gaussians are needed.
 
         Args:
@@ -161,14 +161,14 @@ class Mattes:
         body = self.body
         return colours_of(pictures(self.scene, body.splats, body.frame, body.subject))
 
-    def _start(self, key: Key) -> Start | None:
+    def _start(self, key: Key) -> Expectation | None:
         """What Gaussians say beside a plate, once they are known."""
         if self.alone is None:
             return None
         assert self._plates is not None
         opacity, colours = self._alone_in(key)
         plate = _values(self._plates.image(key[0], 0))
-        return Start(opacity, _bytes(colours + (1 - opacity[..., None]) * plate))
+        return Expectation(opacity, _bytes(colours + (1 - opacity[..., None]) * plate))
 
     def _alone_in(self, key: Key) -> tuple[Array, Array]:
         """(H, W) opacity of the Gaussians that were trained with the subject cut out, and (H, W, 3) their colours
@@ -239,7 +239,7 @@ class Mattes:
         targets = [[self._target(key, *self.cut(key, self._plain(key))) for key in keys] for keys in known]
         return standing(pairs, targets, alone.means)
 
-    def _target(self, key: Key, picture: Array, opacity: Array | None) -> Target:
+    def _target(self, key: Key, picture: Array, opacity: Array | None) -> TargetPicture:
         return target_of(self.scene.camera_in_head(*key), picture, opacity, 1.0)
 
     def _keys(self, frame: int) -> list[Key]:

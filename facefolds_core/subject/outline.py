@@ -23,6 +23,8 @@ Bool = NDArray[np.bool_]
 
 MIN_RADIUS = 0.03
 """Least radius of a layer's middle, units: at c the search for crossings ends."""
+REACHED = (0.5, 0.1, 0.9)
+"""Shares of a direction's opacity at which its surface lies, begins and ends: halves are least moved by a blur."""
 BEYOND = 3.0
 """Voxels: a surface between two voxels is blurred by so much."""
 
@@ -33,7 +35,7 @@ class Profile:
 
     Attributes:
         radius: (...) where half of the opacity is reached from outside; NaN where there is too little of it, units.
-        outer, inner: (...) where a tenth and nine tenths of it are reached, units.
+        outer, inner: (...) where a tenth and nine tenths of it are reached (`REACHED`), units.
         opacity: (...) along the whole direction, float32.
         rgb: (..., 3) colour, composited from outside and divided by the opacity, float32.
     """
@@ -64,7 +66,7 @@ def profile(volume: Volume, chart: Chart, uv: Array, least: float) -> Profile:
         directions,
         farthest,
         0.5 * volume.voxel,
-        np.array([0.5, 0.1, 0.9]),
+        np.array(REACHED),
     )
     radii = np.where(opacity[:, None] >= least, radii, np.nan).astype(np.float64)
     rgb /= np.maximum(opacity, look_kernel.CLEAR)[:, None]
@@ -115,8 +117,8 @@ def window_uv(window: Window, rows: int, columns: int) -> Array:
     return np.stack(np.meshgrid(u, v, indexing="ij"), -1)
 
 
-def texel_uv(window: Window, rows: int, columns: int) -> Array:
-    """(rows, columns, 2) of the middles of a texture's texels."""
+def texel_middles(window: Window, rows: int, columns: int) -> Array:
+    """(rows, columns, 2) of the middles of a texture's texels: `sphere_uv.texel_uv`, which rounds in another order."""
     u = window[1] + (window[0] - window[1]) * (np.arange(rows) + 0.5) / rows
     v = window[2] + (window[3] - window[2]) * (np.arange(columns) + 0.5) / columns
     return np.stack(np.meshgrid(u, v, indexing="ij"), -1)

@@ -43,7 +43,7 @@ SAME = 3.0
 
 
 @dataclass(frozen=True)
-class Start:
+class Expectation:
     """What the subject's Gaussians say of a picture. Hair before a shelf of its colour does not differ from the plate.
 
     Attributes:
@@ -60,7 +60,7 @@ class Start:
         return np.asarray(np.exp(-0.5 * np.square(np.abs(one - two).max(-1) / (SAME * noise))), np.float32)
 
 
-def from_plate(image: Image, plate: Image, start: Start | None = None) -> Array:
+def from_plate(image: Image, plate: Image, start: Expectation | None = None) -> Array:
     """(H, W) opacity of the subject in [0, 1].
 
     Args:
@@ -88,7 +88,7 @@ def _different(image: Image, plate: Image, opacity: Array | None) -> Image:
     return np.asarray(kept[labels], np.uint8)
 
 
-def _soft(image: Image, plate: Image, subject: Image, start: Start | None) -> Array:
+def _soft(image: Image, plate: Image, subject: Image, start: Expectation | None) -> Array:
     """Opacity along the outline, where the plate is what stands behind; 1 within it."""
     depth = np.asarray(ndimage.distance_transform_edt(np.pad(subject, 1, mode="edge")))[1:-1, 1:-1]
     labels, count = ndimage.label(subject)

@@ -17,7 +17,7 @@ from scipy.spatial import cKDTree
 from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.geometry.torso import Torso
 from facefolds_core.geometry.track import Track
-from facefolds_core.subject.fit import Target
+from facefolds_core.subject.fit import TargetPicture
 from facefolds_core.subject.foreign import moved
 from facefolds_core.subject.frames import shown_errors
 from facefolds_core.subject.splats import Splats
@@ -108,7 +108,10 @@ def in_part(splats: Splats, which: Bool, motion: Similarity) -> Splats:
 
 
 def standing(
-    pairs: Sequence[tuple[Splats, Splats]], targets: Sequence[Sequence[Target]], means: Array, asked: Bool | None = None
+    pairs: Sequence[tuple[Splats, Splats]],
+    targets: Sequence[Sequence[TargetPicture]],
+    means: Array,
+    asked: Bool | None = None,
 ) -> Bool:
     """(N,) Gaussians that err less if they stand still, mean over their neighbours, in each frame that shows them.
 

@@ -14,6 +14,8 @@ Array = NDArray[np.float32]
 
 LONG_SIDE = 160
 """Pictures are compared at this size, pixels."""
+BLUR = 0.7
+"""Of these smaller pictures, standard deviation, pixels: noise and steps of a pixel are no texture."""
 NEIGHBOURS = 6
 """Nearest cameras with which a picture is compared,"""
 AGREEING = 3
@@ -22,6 +24,9 @@ PLANES = (12, 64, 24)
 """Depths that are compared before, in and behind the subject's ball, even in inverse depth within each."""
 REACH = (0.45, 10.0)
 """The nearest, in shares of the camera's distance from the origin, and the farthest, units."""
+BEFORE_BALL = 0.9
+"""The nearest depth in shares of the ball's nearest, where a camera stands so close that the first of `REACH` lies
+within the ball: planes must go on from near to far."""
 WINDOW = 5
 """Side of what is compared around a pixel, pixels."""
 TRUNCATED = 0.2
@@ -47,7 +52,7 @@ def _reduced(camera: Camera, picture: Array) -> tuple[Camera, Array]:
     scale = min(1.0, LONG_SIDE / max(camera.width, camera.height))
     camera = camera.resized(max(1, round(camera.width * scale)), max(1, round(camera.height * scale)))
     small = cv2.resize(picture, (camera.width, camera.height), interpolation=cv2.INTER_AREA)
-    return camera, np.asarray(cv2.GaussianBlur(small, (0, 0), 0.7), np.float32)
+    return camera, np.asarray(cv2.GaussianBlur(small, (0, 0), BLUR), np.float32)
 
 
 def _neighbours(cameras: Sequence[Camera], index: int) -> list[int]:
@@ -63,7 +68,7 @@ def _planes(camera: Camera, ball: float) -> Array:
     near, far = max(middle - ball, 0.5 * middle), middle + ball
     edges = [REACH[0] * middle, near, far, max(REACH[1], 2 * far)]
     if edges[0] > near:
-        edges[0] = 0.9 * near
+        edges[0] = BEFORE_BALL * near
     parts = [
         1 / a + (np.arange(count) + 0.5) / count * (1 / b - 1 / a)
         for a, b, count in zip(edges[:-1], edges[1:], PLANES, strict=True)

@@ -14,7 +14,7 @@ from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.geometry.track import turn_of
 
 Array = NDArray[np.float64]
-Picture = NDArray[np.float32]
+Features = NDArray[np.float32]
 
 STEPS = 12
 """Gauss-Newton steps a scale, at most."""
@@ -51,7 +51,7 @@ class Points:
     weight: Array
 
 
-def features(image: NDArray[np.uint8], sigma: float) -> Picture:
+def features(image: NDArray[np.uint8], sigma: float) -> Features:
     """(H, W, 3): a picture's grey levels at a scale, locally normalised, and their slopes along x and y."""
     grey = cv2.GaussianBlur(image.astype(np.float32).mean(-1), (0, 0), sigma)
     mean = cv2.GaussianBlur(grey, (0, 0), 4 * sigma)
@@ -61,7 +61,7 @@ def features(image: NDArray[np.uint8], sigma: float) -> Picture:
     return np.stack([value, slopes[1], slopes[0]], -1).astype(np.float32)
 
 
-def look_up(picture: Picture, pixels: Array) -> Array:
+def look_up(picture: Features, pixels: Array) -> Array:
     """(P, C) at continuous coordinates (P, 2), bilinear."""
     at = (pixels - 0.5).astype(np.float32)[None]
     found = cv2.remap(picture, at[..., 0], at[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
@@ -72,7 +72,7 @@ def refined(
     pose: Similarity,
     cameras: Sequence[Camera],
     points: Sequence[Points],
-    shown: Sequence[Picture],
+    shown: Sequence[Features],
     seen: Sequence[Array],
 ) -> tuple[Similarity, float]:
     """Gauss-Newton steps at one scale; the pose and the correlation there.
@@ -122,7 +122,7 @@ class Equations:
         pose: Similarity,
         cameras: Sequence[Camera],
         points: Sequence[Points],
-        shown: Sequence[Picture],
+        shown: Sequence[Features],
         seen: Sequence[Array],
     ) -> Equations:
         middle = pose.apply(np.concatenate([one.positions for one in points]).mean(0))
@@ -157,7 +157,7 @@ def _rows(
     middle: Array,
     camera: Camera,
     points: Points,
-    shown: Picture,
+    shown: Features,
     seen: Array,
 ) -> tuple[Array, Array, Array, Array, Array]:
     """Slopes (P, 6), depth, residual, value and weight (P,) of the points that this camera sees."""

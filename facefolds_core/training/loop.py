@@ -225,7 +225,7 @@ def train(scene: Scene, params: MlpParams, model_folder: Path, checkpoints: Path
     rays = state.iteration * params.rays
     memory = peak_memory(device)
     report = make_report(state.seconds, state.iteration, device_name(device), memory, params.preset, rays, psnr)
-    Trained(state.model, run.spec, report).save(model_folder)
+    Trained(state.model, run.spec, report, params).save(model_folder)
     shutil.rmtree(run.checkpoints, ignore_errors=True)
     return report
 

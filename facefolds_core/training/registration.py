@@ -28,15 +28,15 @@ from facefolds_core.files.writing import atomic_file
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.geometry.track import Track, own_track
-from facefolds_core.params import NormalizeParams, SubjectParams
+from facefolds_core.params import NormalizeParams
 from facefolds_core.progress import progress
-from facefolds_core.subject.find import find_subject
+from facefolds_core.subject.find import DEFAULT_SUBJECT, find_subject
 from facefolds_core.subject.foreign import moved
 from facefolds_core.subject.found import reference_frame
 from facefolds_core.subject.storage import BODY, Body, write_body
 from facefolds_core.subject.volume import Volume, volume_of
 from facefolds_core.system.spill import by_rows
-from facefolds_core.training.alignment import MIN_COSINE, Equations, Picture, Points, features, look_up, refined, unit
+from facefolds_core.training.alignment import MIN_COSINE, Equations, Features, Points, features, look_up, refined, unit
 
 Array = NDArray[np.float64]
 
@@ -57,6 +57,9 @@ MIN_OPACITY = 0.9
 
 NEARER = 0.25
 """Share of the points that are nearer to the cameras' common centre than one standard deviation of their weight."""
+
+EXTENT = (0.01, 0.99)
+"""Quantiles of the points' coordinates between which the subject extends: single points that float do not count."""
 
 MIN_LIKENESS = 0.6
 """A frame is refused, and its pose bridged, if it correlates with the reference less than this share of the median
@@ -90,7 +93,7 @@ def find_track(scene: Scene) -> Found:
     Raises:
         UserError: if the cameras do not look at one place, or nothing stands out from the background.
     """
-    subject, mattes = find_subject(scene, SubjectParams())
+    subject, mattes = find_subject(scene, DEFAULT_SUBJECT)
     volume, reference = volume_of(subject.splats), reference_frame(scene)
     cameras = [scene.cameras[i] for i in scene.indices("train")]
     points = weighted([surface_points(volume, camera) for camera in cameras])
@@ -104,7 +107,7 @@ def find_track(scene: Scene) -> Found:
     cloud = np.concatenate([one.positions for one in points])
     middle = np.average(cloud, axis=0, weights=np.concatenate([one.weight for one in points]))
     track = own_track(poses, np.array([pose.apply(middle) for pose in poses]))
-    size = float(np.ptp(np.quantile(cloud, [0.01, 0.99], axis=0), axis=0).max())
+    size = float(np.ptp(np.quantile(cloud, EXTENT, axis=0), axis=0).max())
     shift = max(float(np.linalg.norm(track.at(k).apply(middle) - middle)) for k in range(len(track))) / size
     facts = (fact("poses_refused", frames=[scene.frame_ids[k] for k in refused]),) if refused else ()
     return Found(track, float(track.degrees().max()), shift, likeness, facts, mattes.body)
@@ -192,7 +195,7 @@ def _deepened(
     seen = _seen(scene, points, reference, sigma)
     found, likeness = list(poses), np.ones(len(poses))
 
-    def shown(k: int) -> list[Picture]:
+    def shown(k: int) -> list[Features]:
         return [features(store.image(i, k), sigma) for i in indices]
 
     curvature, slope = 1e-9, 0.0

@@ -13,6 +13,7 @@ import torch
 from facefolds_core.files.writing import atomic_folder, write_json
 from facefolds_core.model.radiance import RadianceManifolds
 from facefolds_core.model.storage import Spec, save_model
+from facefolds_core.params import TrainParams
 
 IMPORTED = time.process_time()
 """Processor time of this process until here."""
@@ -80,12 +81,14 @@ class Trained:
         model: what the export and the evaluation take.
         spec: what `model.json` says of it.
         report: seconds, iterations, PSNR on training rays.
+        params: that ran (`params.json`), with the values of preset, subject and defaults filled in.
         fit: what was chosen and why (`fit.json`), of models that choose.
     """
 
     model: RadianceManifolds
     spec: Spec
     report: TrainingReport
+    params: TrainParams
     fit: dict[str, Any] | None = None
 
     def save(self, folder: Path) -> None:
@@ -97,5 +100,6 @@ class Trained:
         """Write the model's files into a folder that is there."""
         save_model(self.model, self.spec, folder)
         write_json(folder / "training.json", asdict(self.report))
+        write_json(folder / "params.json", self.params.model_dump(mode="json"))
         if self.fit is not None:
             write_json(folder / "fit.json", self.fit)

@@ -24,6 +24,10 @@ MARGIN = 0.05
 FILL = 0.8
 """Without a tracked mesh, share of the narrower half field of view that the subject fills."""
 
+BESIDE, BEHIND = 0.05, 0.02
+"""A vertex is covered if one within the first, between unit directions, lies farther out by the second, units: the
+first is wider than the gaps between a tracked mesh's vertices, the second deeper than wrinkles."""
+
 ITERATIONS = 600
 """Steps of the regression onto the tracked mesh (`manifold_start: surface`)."""
 
@@ -84,7 +88,7 @@ def find_start(scene: Scene, params: MlpParams) -> Start:
 
 
 def find_outline(vertices: Array) -> Outline:
-    """Outermost vertices (V, 3) in front of c: none within 0.05 (of direction) lies more than 0.02 units farther out.
+    """Outermost vertices (V, 3) in front of c: none `BESIDE` lies farther out by `BEHIND`.
 
     This leaves out what another part of the surface covers, seen from outside: eye sockets, mouth, back of the ears.
     """
@@ -92,9 +96,9 @@ def find_outline(vertices: Array) -> Outline:
     offset = offset[offset[:, 0] > 0]
     radii = np.linalg.norm(offset, axis=1)
     directions = offset / radii[:, None]
-    neighbours = cKDTree(directions).query_ball_point(directions, 0.05)
+    neighbours = cKDTree(directions).query_ball_point(directions, BESIDE)
     highest = np.array([radii[ids].max() for ids in neighbours])
-    keep = radii > highest - 0.02
+    keep = radii > highest - BEHIND
     return Outline(directions[keep], radii[keep])
 
 

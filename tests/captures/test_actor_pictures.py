@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from facefolds_core.captures.actor import ActorOptions, Picture, camera_at, render, tracked_mesh
+from facefolds_core.captures.actor import ActorOptions, ActorPicture, camera_at, render, tracked_mesh
 from facefolds_core.captures.actor.motion import BLINK, PERIOD, pose_at
 from facefolds_core.geometry.cameras import Camera
 
@@ -23,23 +23,23 @@ def frontal(width: int = WIDTH, height: int = HEIGHT) -> Camera:
     return camera_at("front", 0.0, 0.0, width, height)
 
 
-def colour_at(picture: Picture, camera: Camera, point: np.ndarray) -> np.ndarray:
+def colour_at(picture: ActorPicture, camera: Camera, point: np.ndarray) -> np.ndarray:
     (x, y), _ = camera.project(to_world(point))
     return picture.rgb[int(y), int(x)].astype(float)
 
 
 @pytest.fixture(scope="module")
-def rest() -> Picture:
+def rest() -> ActorPicture:
     return render(frontal(), 0.0)
 
 
-def test_same_arguments_give_the_same_picture(rest: Picture) -> None:
+def test_same_arguments_give_the_same_picture(rest: ActorPicture) -> None:
     again = render(frontal(), 0.0)
     for name in ("rgb", "opacity", "depth"):
         assert np.array_equal(getattr(rest, name), getattr(again, name)), name
 
 
-def test_a_picture_has_colour_opacity_and_depth_and_the_room_none(rest: Picture) -> None:
+def test_a_picture_has_colour_opacity_and_depth_and_the_room_none(rest: ActorPicture) -> None:
     assert (rest.rgb.shape, rest.rgb.dtype) == ((HEIGHT, WIDTH, 3), np.uint8)
     assert rest.opacity.shape == rest.depth.shape == (HEIGHT, WIDTH)
     assert rest.opacity.dtype == rest.depth.dtype == np.float32
@@ -48,7 +48,7 @@ def test_a_picture_has_colour_opacity_and_depth_and_the_room_none(rest: Picture)
     assert np.all(np.isinf(rest.depth[:4]))
 
 
-def test_hair_is_semi_transparent(rest: Picture) -> None:
+def test_hair_is_semi_transparent(rest: ActorPicture) -> None:
     # Away from the opaque silhouette, so that only hair can make a fraction.
     no_surface = np.isinf(rest.depth)
     inner = no_surface.copy()
@@ -58,7 +58,7 @@ def test_hair_is_semi_transparent(rest: Picture) -> None:
     assert partly.sum() > 30
 
 
-def test_without_hair_the_top_of_the_head_is_smaller(rest: Picture) -> None:
+def test_without_hair_the_top_of_the_head_is_smaller(rest: ActorPicture) -> None:
     bald = render(frontal(), 0.0, ActorOptions(hair_density=0.0))
     assert bald.opacity.sum() < 0.9 * rest.opacity.sum()
     assert np.array_equal(bald.depth, rest.depth)
@@ -96,7 +96,7 @@ def test_depth_agrees_with_the_tracked_mesh(azimuth: float) -> None:
     assert np.mean(error < -3.0) < 0.01
 
 
-def test_any_time_between_frames_differs_from_its_neighbours(rest: Picture) -> None:
+def test_any_time_between_frames_differs_from_its_neighbours(rest: ActorPicture) -> None:
     half, opened = (render(frontal(), time) for time in (OPEN_MOUTH - 0.07, OPEN_MOUTH))
     still, between, wide = (picture.rgb[20:56, 14:34].astype(float) for picture in (rest, half, opened))
     apart = np.abs(wide - still).mean()
@@ -104,7 +104,7 @@ def test_any_time_between_frames_differs_from_its_neighbours(rest: Picture) -> N
     assert 0 < np.abs(between - wide).mean() < apart
 
 
-def test_performance_is_periodic(rest: Picture) -> None:
+def test_performance_is_periodic(rest: ActorPicture) -> None:
     later = render(frontal(), 3 * PERIOD)
     # 3 * PERIOD / PERIOD is a whole number up to rounding, so that at most single grey levels move.
     assert np.abs(later.rgb.astype(int) - rest.rgb).max() <= 1
@@ -118,7 +118,7 @@ def test_head_stands_still_but_may_move() -> None:
     assert not np.array_equal(moved, still[1])
 
 
-def test_blink_covers_the_iris(rest: Picture) -> None:
+def test_blink_covers_the_iris(rest: ActorPicture) -> None:
     assert pose_at(SHUT_EYES)[BLINK] == pytest.approx(1.0)
     eye = np.array([32.0, 0.0, 82.0])
     camera = frontal()
@@ -152,7 +152,7 @@ def test_gloss_moves_with_the_view_and_can_be_turned_up() -> None:
     assert more > 1.5 * plain
 
 
-def test_clutter_changes_the_room_and_nothing_else(rest: Picture) -> None:
+def test_clutter_changes_the_room_and_nothing_else(rest: ActorPicture) -> None:
     picture = render(frontal(), 0.0, ActorOptions(clutter=1.0))
     subject, room = rest.opacity == 1, rest.opacity == 0
     # At the outline a trace of the room shines through where opacity rounds to 1.
@@ -162,7 +162,7 @@ def test_clutter_changes_the_room_and_nothing_else(rest: Picture) -> None:
     assert np.abs(picture.opacity - rest.opacity).max() < 0.01  # taken from two pictures, before two rooms
 
 
-def test_a_longer_nose_stands_out_by_as_much(rest: Picture) -> None:
+def test_a_longer_nose_stands_out_by_as_much(rest: ActorPicture) -> None:
     longer = render(frontal(), 0.0, ActorOptions(nose=20.0))
     # Seen from the front its tip comes nearer by all of it, and the rest of the face stays.
     assert np.nanmin(rest.depth) - np.nanmin(longer.depth) == pytest.approx(20.0, abs=1.0)
@@ -170,7 +170,7 @@ def test_a_longer_nose_stands_out_by_as_much(rest: Picture) -> None:
     assert np.ptp(tracked_mesh(0.0, 20.0).vertices[:, 2]) - np.ptp(tracked_mesh(0.0).vertices[:, 2]) > 15
 
 
-def test_a_ball_before_the_mouth_is_a_disc_of_its_size(rest: Picture) -> None:
+def test_a_ball_before_the_mouth_is_a_disc_of_its_size(rest: ActorPicture) -> None:
     picture = render(frontal(), 0.0, ActorOptions(ball=20.0))
     changed = (picture.depth < rest.depth - 5).sum()
     camera = frontal()

@@ -15,7 +15,7 @@ from facefolds_core.captures import videos
 from facefolds_core.captures.capture import Capture, View
 from facefolds_core.captures.developing import Negative, photos
 from facefolds_core.captures.picture import VideoFrame
-from facefolds_core.captures.videos import Video, check_together
+from facefolds_core.captures.videos import CameraVideo, check_together
 from facefolds_core.errors import UserError
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.params import NormalizeParams
@@ -30,8 +30,8 @@ def write(path: Path, frames: np.ndarray = FRAMES, rate: int = 25, **options: An
     return path
 
 
-def video(path: Path) -> Video:
-    return Video(path, "c7")
+def video(path: Path) -> CameraVideo:
+    return CameraVideo(path, "c7")
 
 
 def refused(path: Path, match: str) -> UserError:
@@ -170,8 +170,8 @@ def test_a_tag_that_turns_it(tmp_path: Path) -> None:
     assert "90" in str(refused(path, "turns it").found)
 
 
-def several(folder: Path, *made: dict[str, Any]) -> list[Video]:
-    return [Video(write(folder / f"{c}.mp4", **keys), f"c{c}") for c, keys in enumerate(made)]
+def several(folder: Path, *made: dict[str, Any]) -> list[CameraVideo]:
+    return [CameraVideo(write(folder / f"{c}.mp4", **keys), f"c{c}") for c, keys in enumerate(made)]
 
 
 def test_videos_that_run_side_by_side(tmp_path: Path) -> None:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import ast
 import json
-import re
 from pathlib import Path
 
 import pytest
@@ -11,7 +11,7 @@ import pytest
 from facefolds_core.config.params_file import load_params, write_configs
 from facefolds_core.config.stages import read_level_resolutions, read_stage, read_subject, read_train
 from facefolds_core.errors import UserError
-from facefolds_core.params import BakeParams, CompressParams, MlpParams, TextureParams
+from facefolds_core.params import BakeParams, CompressParams, MlpParams, Section, TextureParams
 
 MINIMAL = "subjects:\n  a: {source: actor, path: x}\n"
 
@@ -75,6 +75,9 @@ def test_a_change_of_one_section_changes_one_file_only(tmp_path: Path) -> None:
         ("train: {}\n", "no subjects"),
         ("", "no subjects"),
         (MINIMAL + "trian: {}\n", "trian"),
+        (MINIMAL + "matte: {method: auto}\n", "your own are named by `subjects.NAME.mattes`"),
+        ("subjects:\n  a: {source: actor, path: x, matte: {}}\n", "your own are named by `subjects.NAME.mattes`"),
+        ("subjects:\n  a: {source: actor, path: x, train: {volume: {reach: 1}}}\n", "starts from the Gaussians"),
         (MINIMAL + "train: {preset: fastest}\n", "there are"),
         (MINIMAL + "train: {preset: [fast]}\n", "there are"),
         (MINIMAL + "train: fast\n", "keys and values"),
@@ -125,11 +128,103 @@ def test_a_garbled_stage_config_is_a_user_error(tmp_path: Path) -> None:
         read_stage(TextureParams, tmp_path)
 
 
+MADE_ELSEWHERE = {
+    "api/capture.py": "what a caller gives `load_capture` becomes an entry of `subjects`",
+    "api/work.py": "what a caller gives a step becomes a section, written for the stage as `configure` does",
+    "captures/appraisal.py": "`facefolds doctor` tries the entry that it proposes; no stage runs",
+    "captures/sources/__init__.py": "the embedded actor's rate follows from how she was filmed",
+    "cli/render.py": "a film of an asset, which no section is about",
+    "packaging/settings.py": "levels of an asset differ from one another; the manifest says what ran",
+    "subject/find.py": "`DEFAULT_SUBJECT`, which says where it is used and why",
+}
+"""The modules beside params and config that make or change parameters, and why they may."""
+
+
+def section_names(kind: type[Section] = Section) -> set[str]:
+    """Of all classes of sections; `config.params_file` and the trainers' are among them."""
+    return {"TrainParams", *(name for one in kind.__subclasses__() for name in {one.__name__, *section_names(one)})}
+
+
+def head_of(expression: ast.expr) -> ast.expr:
+    """ "params" of `params.video.crf`."""
+    while isinstance(expression, ast.Attribute):
+        expression = expression.value
+    return expression
+
+
+def makes_parameters(source: str) -> list[str]:
+    """The calls of a module that make a section or one like another, and the classes that are called like one.
+
+    What holds a section is told by annotations, by `.params`, and by assignments.
+    """
+    tree, sections = ast.parse(source), section_names()
+    of = ("facefolds_core.params", "facefolds_core.config")
+    imported = [n for n in ast.walk(tree) if isinstance(n, ast.ImportFrom) and str(n.module).startswith(of)]
+    known = {one.asname or one.name for n in imported for one in n.names if one.name in sections}
+
+    def is_section(value: ast.expr, held: set[str]) -> bool:
+        if isinstance(value, ast.Call) and isinstance(value.func, ast.Attribute) and value.func.attr == "model_copy":
+            return is_section(value.func.value, held)
+        inner = {n.attr for n in ast.walk(value) if isinstance(n, ast.Attribute)}
+        head = head_of(value)
+        return isinstance(head, ast.Name) and (head.id in held or "params" in inner)
+
+    def holders(function: ast.AST) -> set[str]:
+        arguments = [n for n in ast.walk(function) if isinstance(n, ast.arg | ast.AnnAssign) and n.annotation]
+        held = {"params"}
+        for one in arguments:
+            names = {n.id for n in ast.walk(one.annotation) if isinstance(n, ast.Name)}  # type: ignore[arg-type]
+            held |= {one.arg if isinstance(one, ast.arg) else ast.unparse(one.target)} if names & known else set()
+        for given in (n for n in ast.walk(function) if isinstance(n, ast.Assign)):
+            for target in given.targets:
+                both = isinstance(target, ast.Tuple) and isinstance(given.value, ast.Tuple)
+                pairs = zip(target.elts, given.value.elts, strict=False) if both else [(target, given.value)]  # type: ignore[attr-defined]
+                held |= {to.id for to, value in pairs if isinstance(to, ast.Name) and is_section(value, held)}
+        return held
+
+    found = [n.name for n in ast.walk(tree) if isinstance(n, ast.ClassDef) and n.name.endswith("Params")]
+    functions = [n for n in ast.walk(tree) if isinstance(n, ast.FunctionDef)] or [tree]
+    for scope in (tree, *functions):
+        held = holders(scope) if scope is not tree else {"params"}
+        for call in (n for n in ast.walk(scope) if isinstance(n, ast.Call)):
+            name = call.func.attr if isinstance(call.func, ast.Attribute) else ast.unparse(call.func)
+            head = head_of(call.func)
+            makes = name in known | {"section_of", "train_params"} or (
+                name.startswith(("model_validate", "model_construct"))
+                and isinstance(head, ast.Name)
+                and head.id in known
+            )
+            copied = (
+                call.func.value if name == "model_copy" else call.args[0] if name == "replace" and call.args else None
+            )  # type: ignore[attr-defined]
+            if makes or (copied is not None and is_section(copied, held)):
+                found.append(ast.unparse(call))
+    return found
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "p = SubjectParams(seed=1)",
+        "p = dataclasses.replace(\n    params, seed=1)",
+        "p = SubjectParams.model_validate({})",
+        "def f(how: SubjectParams): return how.model_copy(\n    update={})",
+        "def f(all: CompressParams):\n    mesh, video = all.mesh, all.video\n    return video.model_copy(update={})",
+        "class A:\n    def f(self): return self.params.video.model_copy(update={})",
+        "class GlossParams: pass",
+    ],
+)
+def test_a_module_that_makes_parameters_is_noticed(line: str) -> None:
+    assert makes_parameters(f"from facefolds_core.params import CompressParams, SubjectParams\n{line}\n")
+
+
 def test_what_is_configured_is_what_runs(project_root: Path) -> None:
-    """Parameters are changed on the way in one place, for the levels of an asset; the manifest says what ran there."""
-    changed = re.compile(r"\b(params|config)(\.\w+)*\.model_copy\(|\breplace\((params|config|settings)\b")
-    library = (project_root / "facefolds_core").rglob("*.py")
-    assert {path.name for path in library if changed.search(path.read_text(encoding="utf-8"))} == {"settings.py"}
+    """Parameters are made and changed in params and config alone, and in the modules that are named with a reason."""
+    library = project_root / "facefolds_core"
+    modules = {path.relative_to(library).as_posix(): path.read_text("utf-8") for path in library.rglob("*.py")}
+    others = {name: text for name, text in modules.items() if not name.startswith(("params/", "config/"))}
+    found = {name: calls for name, text in others.items() if (calls := makes_parameters(text))}
+    assert found.keys() == MADE_ELSEWHERE.keys(), found
 
 
 def test_every_file_of_the_configuration_is_an_object(tmp_path: Path) -> None:

@@ -7,7 +7,7 @@ import pytest
 
 from facefolds_core.subject import cut_out as cut_out_module
 from facefolds_core.subject.cut_out import INSIDE, agreement, around, colours_of, cut_out, doubted, softened
-from facefolds_core.subject.plates import Start, from_plate
+from facefolds_core.subject.plates import Expectation, from_plate
 from tests.scenes import look_at_origin
 
 
@@ -144,7 +144,7 @@ def test_gaussians_say_where_hair_ends_before_a_shelf_of_its_colour() -> None:
     chin = image.copy()
     chin[60:, 40:56] = plate[60:, 40:56]
     plate, image, chin = (np.rint(one + rng.normal(0, 1.5, one.shape)).astype(np.uint8) for one in (plate, image, chin))
-    start = Start(hair.astype(np.float32), image)
+    start = Expectation(hair.astype(np.float32), image)
     alone, found = (from_plate(image, plate, start=one) for one in (None, start))
     assert np.abs(alone - hair).mean() > 0.03  # hair that looks like the shelf is lost
     assert np.abs(found - hair).mean() < 0.01
@@ -192,7 +192,7 @@ def test_through_glasses_one_sees_the_plate_where_no_gaussians_are() -> None:
     image, plate = _before_a_plate((disc & ~hole).astype(float))
     middle = np.hypot(x - 32, y - 32) < 5
     for opacity, found in ((None, 1.0), (disc, 1.0), (disc & ~hole, 0.0)):
-        said = None if opacity is None else Start(opacity.astype(np.float32), image)
+        said = None if opacity is None else Expectation(opacity.astype(np.float32), image)
         np.testing.assert_allclose(from_plate(image, plate, start=said)[middle], found, atol=0.05)
 
 

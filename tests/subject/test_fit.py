@@ -22,7 +22,7 @@ from facefolds_core.subject.find import fit_room, pictures_of
 from facefolds_core.subject.fit import fit_pictures
 from facefolds_core.subject.foreign import moved, read_start
 from facefolds_core.subject.found import background, near_enough, subject_of
-from facefolds_core.subject.gaussians import GaussianParams
+from facefolds_core.subject.gaussians import GaussianMethod
 from facefolds_core.subject.hull import contradicted, looks_like
 from facefolds_core.subject.mattes import Mattes
 from facefolds_core.subject.ply import write_ply
@@ -34,7 +34,7 @@ from tests.scenes import OPAQUE, first_hit, look_at_origin
 from tests.scenes import render as true_picture
 
 SIZE, CAMERAS, HELD = 48, 8, 3
-PARAMS = GaussianParams(fewest=1200, most=1200, iterations=800, every=50)
+PARAMS = GaussianMethod(fewest=1200, most=1200, iterations=800, every=50)
 
 
 def wall(camera):  # type: ignore[no-untyped-def]
@@ -104,7 +104,7 @@ def test_a_view_that_was_left_out(scene: Scene, splats: Splats) -> None:
 
 
 def test_the_same_again(scene: Scene) -> None:
-    few = GaussianParams(fewest=200, most=200, iterations=12, every=4)
+    few = GaussianMethod(fewest=200, most=200, iterations=12, every=4)
     cameras, pictures = pictures_of(scene, 0, scene.indices("train"))
     one, two = (fit_pictures(cameras, pictures, few, seed=3) for _ in range(2))
     np.testing.assert_array_equal(one.values, two.values)

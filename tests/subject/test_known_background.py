@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from facefolds_core.subject.known_background import DEVIATION, SPREAD, _Colours
+from facefolds_core.subject.known_background import DEVIATION, SPREAD, _NearbyColours
 
 
 @pytest.mark.parametrize("size", [(60, 80), (61, 79)])
@@ -15,7 +15,7 @@ def test_mean_and_covariance_are_those_of_a_gaussian_neighbourhood(size: tuple[i
     colours = cv2.GaussianBlur(random.random((*size, 3)).astype(np.float32), (0, 0), 2.0)
     opacity = (random.random(size) * (random.random(size) > 0.3)).astype(np.float32)
     first = opacity * (np.arange(size[1]) < 40)
-    found = _Colours(colours, first)
+    found = _NearbyColours(colours, first)
     rest = np.nonzero(opacity - first)
     found.add(rest, colours[rest], opacity[rest])
     asked = random.integers(10, 50, (2, 200))
@@ -34,5 +34,5 @@ def test_mean_and_covariance_are_those_of_a_gaussian_neighbourhood(size: tuple[i
 def test_far_from_all_that_is_known_the_nearest_colours_count() -> None:
     colours, opacity = np.full((40, 400, 3), 0.25, np.float32), np.zeros((40, 400), np.float32)
     opacity[:, :10] = 1
-    mean, _ = _Colours(colours, opacity).around((np.array([20]), np.array([390])))
+    mean, _ = _NearbyColours(colours, opacity).around((np.array([20]), np.array([390])))
     np.testing.assert_allclose(mean, 0.25, atol=1e-5)

@@ -71,7 +71,9 @@ def test_a_textured_sphere_is_seen_from_a_new_camera(trained: tuple[Scene, Path]
 def test_model_folder_is_whole_and_says_why(trained: tuple[Scene, Path]) -> None:
     """A matte sphere's reflection is tried, found to gain nothing on cameras left out, and said to be left out."""
     names = {p.name for p in trained[1].iterdir()}
-    assert names == {"model.safetensors", "model.json", "training.json", "fit.json"}
+    assert names == {"model.safetensors", "model.json", "training.json", "params.json", "fit.json"}
+    ran = json.loads((trained[1] / "params.json").read_text())
+    assert ran == json.loads(_params(iterations=330, geometry={}, textures={"pixels_per_texel": 1.2}).model_dump_json())
     said = json.loads((trained[1] / "fit.json").read_text())
     assert "no_reflection" in {event["kind"] for event in said["events"]}
     assert load_model(trained[1]).reflection_maps() is None

@@ -19,8 +19,8 @@ from facefolds_core.params import ReflectionParams
 from facefolds_core.scoring.model_view import ModelView
 from facefolds_core.training.explicit.gloss import GlossFit
 from facefolds_core.training.explicit.loop import fit_explicit
-from facefolds_core.training.explicit.reflection import GlossParams
-from facefolds_core.training.explicit.reflection_maps import Maps, Seen, surface_normals
+from facefolds_core.training.explicit.reflection import GlossMethod
+from facefolds_core.training.explicit.reflection_maps import Maps, SeenRays, surface_normals
 from facefolds_core.training.explicit.state import TextureState
 from facefolds_core.training.explicit.views import StillRays, trace_views
 from tests.geometry.test_track import about
@@ -73,13 +73,13 @@ def test_the_rays_of_a_fit_are_every_so_many_th_of_all_frames_together(scene: Sc
     state = TextureState((8, 8), 3, 6, torch.full((2, 2, 3), 0.5), params())
     state.layers[0] = 4 * torch.randn(state.layers[0].shape, generator=torch.Generator().manual_seed(0))
     fits = [
-        GlossFit(layers().chart, WINDOW, ReflectionParams(), turns, GlossParams(rays=most, moving_frames=5))
+        GlossFit(layers().chart, WINDOW, ReflectionParams(), turns, GlossMethod(rays=most, moving_frames=5))
         for most in (10**6, 100)
     ]
     every, some = (fit.look(state, source, Noise()) for fit in fits)
     step = -(-len(every.st) // 100)
     assert step > 1 and len({turn.tobytes() for turn in some.turns}) == 5
-    for field in fields(Seen):
+    for field in fields(SeenRays):
         np.testing.assert_array_equal(getattr(some, field.name), getattr(every, field.name)[::step])
 
 
@@ -109,7 +109,7 @@ def test_rays_that_are_clear_reflect_in_the_middle(scene: Scene) -> None:
     """Not in the corner of the window, where a mean over no opacity lies."""
     source = rays(scene, share=150)
     views, _ = source.part(0, 0, 1)
-    seen = Seen.middle(views)
+    seen = SeenRays.middle(views)
     half = replace(seen, st=0 * seen.st + 0.25, opacity=np.linspace(0, 1, len(seen.st), dtype=np.float32))
     found = half.filled(views).st
     clear = half.opacity < 0.1

@@ -18,17 +18,16 @@ from facefolds_core.model.reflection import Reflection, ReflectionShape
 from facefolds_core.params import ReflectionParams
 from facefolds_core.training.explicit.gloss import GlossFit
 from facefolds_core.training.explicit.reflection import (
-    GlossParams,
+    GlossMethod,
     centred,
     fit_maps,
     gain_on_cameras,
     grounded,
-    smoothed,
 )
 from facefolds_core.training.explicit.reflection_kernel import look, normal_equations
 from facefolds_core.training.explicit.reflection_maps import (
     Maps,
-    Seen,
+    SeenRays,
     surface_normals,
     tangents,
     tilted,
@@ -41,7 +40,7 @@ from tests.training.test_explicit_kernels import random_cut
 
 WINDOW = (-0.5, 0.4, -0.3, 0.6)
 KEYS = ReflectionParams(enabled=True, texels=8, environment_texels=8)
-PARAMS = GlossParams()
+PARAMS = GlossMethod()
 
 
 def _random_maps(seed: int = 0, shape: tuple[int, int] = (8, 8)) -> Maps:
@@ -66,9 +65,9 @@ def _rays(count: int) -> tuple[np.ndarray, np.ndarray]:
     return rng.random((count, 2), np.float32), along.astype(np.float32)
 
 
-def _looked(st: np.ndarray, along: np.ndarray, turns: np.ndarray | None = None) -> Seen:
+def _looked(st: np.ndarray, along: np.ndarray, turns: np.ndarray | None = None) -> SeenRays:
     """Opaque rays that show nothing."""
-    return Seen(np.zeros(len(st), np.int32), along, st, np.ones(len(st), np.float32), np.zeros_like(along), turns)
+    return SeenRays(np.zeros(len(st), np.int32), along, st, np.ones(len(st), np.float32), np.zeros_like(along), turns)
 
 
 def _turns(count: int) -> np.ndarray:
@@ -131,7 +130,7 @@ def test_normal_equations_are_those_of_a_dense_matrix() -> None:
     np.testing.assert_allclose(right, rows.T @ wish, atol=1e-4)
 
 
-def _seen(strength: float, turned: bool = False, maps: Maps = TRUTH) -> Seen:
+def _seen(strength: float, turned: bool = False, maps: Maps = TRUTH) -> SeenRays:
     """Rays of eight cameras whose photos show `strength` times a known reflection, its mean in the layers."""
     looked = _looked(*_rays(20_000), _turns(20_000) if turned else None)
     rng, count = np.random.default_rng(2), len(looked.st)
@@ -182,8 +181,8 @@ def test_a_smoother_one_is_asked_for_where_little_is_gained(
     gloss.maps, gloss._normals = START, START.surface
     state = SimpleNamespace(shine=np.ones((3, 3), np.float32))
 
-    def gain(_: Seen, __: Maps, asked: GlossParams) -> float:
-        return fine if asked == PARAMS else smooth
+    def gain(_: SeenRays, __: Maps, ___: GlossMethod, smoother: float = 1.0) -> float:
+        return fine if smoother == 1 else smooth
 
     with patch("facefolds_core.training.explicit.gloss.gain_on_cameras", gain):
         found = gloss._decide(cast(Any, state), seen)
@@ -194,8 +193,8 @@ def test_a_smoother_one_is_asked_for_where_little_is_gained(
     elif kind == "no_reflection":
         assert gloss.maps is None and len(state.shine) == 0
     else:
-        params = smoothed(PARAMS, 10.0)
-        expected = centred(grounded(fit_maps(seen, START, PARAMS.first_rounds, params)), seen, params)
+        fitted = grounded(fit_maps(seen, START, PARAMS.first_rounds, PARAMS, 10.0))
+        expected = centred(fitted, seen, PARAMS, 10.0)
         assert gloss.maps is not None and len(state.shine) == len(seen.st)
         for field in fields(Maps):
             np.testing.assert_allclose(getattr(gloss.maps, field.name), getattr(expected, field.name), atol=1e-6)
@@ -249,5 +248,5 @@ def test_a_ray_reflects_at_the_layer_nearest_to_the_middle() -> None:
     codes[0, :] = 1 + np.arange(5)[:, None] * 1000
     codes[1, [0, 4]] = [[1, 65535], [65535, 1]]
     codes[2, 1:] = codes[0, 1:] * (np.arange(1, 5) != 2)[:, None]
-    st = Seen.middle(one_each(codes), np.eye(3, dtype=np.float32)).st
+    st = SeenRays.middle(one_each(codes), np.eye(3, dtype=np.float32)).st
     np.testing.assert_allclose(st, [[2000 / 65534] * 2, [0, 1], [1000 / 65534] * 2], atol=1e-6)

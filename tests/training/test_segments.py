@@ -21,6 +21,7 @@ from facefolds_core.files.writing import read_json
 from facefolds_core.geometry.track import Track
 from facefolds_core.model import load_model
 from facefolds_core.model.segmented import SegmentedTextures
+from facefolds_core.params import train_params
 from facefolds_core.training.segments.frames import FrameFitter
 from facefolds_core.training.segments.loop import base_of, fit_take
 from facefolds_core.training.segments.plan import plan_take
@@ -69,6 +70,7 @@ def test_each_frame_is_shown_best_by_its_own_textures(take: tuple[Scene, Path]) 
 
 def test_the_model_holds_base_and_segments_and_is_linear_between_frames(take: tuple[Scene, Path]) -> None:
     folder = take[1] / "model"
+    assert train_params(read_json(folder / "params.json")) == params(processes=1)
     assert sorted(p.name for p in (folder / "segments").iterdir()) == [f"{i:05d}.safetensors" for i in range(3)]
     textures = load_model(folder).textures
     assert isinstance(textures, SegmentedTextures) and textures.lengths == (2, 2, 1)

@@ -155,6 +155,8 @@ def test_a_run_leaves_its_model_its_report_and_its_log_and_sends_nothing(
     assert not list((tmp_path / "checkpoints").rglob("*.safetensors"))
     report = json.loads((tmp_path / "model" / "training.json").read_text())
     assert report["iterations"] == 12 and report["device"].startswith("cpu") and report["preset"] == "quick"
+    ran = train_params(json.loads((tmp_path / "model" / "params.json").read_text()))
+    assert ran == params(checkpoint_seconds=1e-9)
     assert load_model(tmp_path / "model").num_layers == 3
 
 

@@ -49,12 +49,12 @@ def processes() -> list[psutil.Process]:
 
 
 def files(folder: Path) -> dict[str, bytes]:
-    """Of a model and its log, without times."""
+    """Of a model and its log, without times and numbers of processes."""
     found = {
         str(path.relative_to(folder)): path.read_bytes()
         for part in ("model", "log")
         for path in sorted((folder / part).rglob("*"))
-        if path.is_file() and path.name != "training.json"
+        if path.is_file() and path.name not in ("training.json", "params.json")
     }
     assert {"model/segments/00002.safetensors", "log/plots/metrics/segment_psnr.tsv"} <= found.keys()
     return found

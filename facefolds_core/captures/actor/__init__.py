@@ -7,14 +7,14 @@ product's rendering, so that one can judge the other. docs/guide/actor.md descri
 from facefolds_core.captures.actor.capture import SEGMENT, frame_times, write_capture
 from facefolds_core.captures.actor.mesh import tracked_mesh
 from facefolds_core.captures.actor.motion import head_pose
-from facefolds_core.captures.actor.render import ActorOptions, Picture, render
+from facefolds_core.captures.actor.render import ActorOptions, ActorPicture, render
 from facefolds_core.captures.actor.rig import ActorRig, camera_at, make_rig
 
 __all__ = [
     "SEGMENT",
     "ActorOptions",
+    "ActorPicture",
     "ActorRig",
-    "Picture",
     "camera_at",
     "frame_times",
     "head_pose",

@@ -77,7 +77,7 @@ _UP = np.array([0.0, -1e6, 0.0])
 
 
 @dataclass(frozen=True)
-class Picture:
+class ActorPicture:
     """What a camera sees.
 
     Attributes:
@@ -229,7 +229,7 @@ def _render_samples(
     return rgb, opacity, depth
 
 
-def render(camera: Camera, time: float, options: ActorOptions | None = None) -> Picture:
+def render(camera: Camera, time: float, options: ActorOptions | None = None) -> ActorPicture:
     """The actor as a camera sees it.
 
     Args:
@@ -259,15 +259,15 @@ def render(camera: Camera, time: float, options: ActorOptions | None = None) -> 
         lights,
         settings,
     )
-    return Picture(rgb, opacity, depth)
+    return ActorPicture(rgb, opacity, depth)
 
 
-def _exposed(camera: Camera, time: float, options: ActorOptions) -> Picture:
+def _exposed(camera: Camera, time: float, options: ActorOptions) -> ActorPicture:
     """The mean of EXPOSURES sharp pictures, evenly spread over the time that the shutter is open; depth at `time`."""
     sharp = replace(options, shutter=0.0)
     times = time + options.shutter * (np.arange(EXPOSURES) / (EXPOSURES - 1) - 0.5)
     pictures = [render(camera, float(t), sharp) for t in times]
-    return Picture(
+    return ActorPicture(
         rgb=np.rint(np.mean([p.rgb for p in pictures], 0)).astype(np.uint8),
         opacity=np.mean([p.opacity for p in pictures], 0).astype(np.float32),
         depth=pictures[EXPOSURES // 2].depth,

@@ -48,6 +48,9 @@ PIXEL_CENTRES = 0.0
 """OpenCV's calibration, from which Multiface's KRT comes, puts the centre of the first pixel at 0."""
 FULL_SIZE = (1334, 2048)
 """(width, height) of Multiface's own images, v1 and v2."""
+OFF_CENTRE = 0.25
+"""Of the image's size: a principal point that is farther from the middle is not near it. K of half the size puts it so
+far off, K of twice the size twice as far."""
 _ROWS = (3, 3, 3, 5, 4, 4, 4)
 """Numbers in the lines of a camera of KRT, behind its name."""
 _REMEDY = "copy KRT again from the dataset, or mend this line"
@@ -191,7 +194,7 @@ def krt_reference(
     """Find out which image size K refers to.
 
     Two hypotheses: the images at hand, or the dataset's full size. A principal point lies near the middle of the image,
-    so the one with the smaller median distance |c / size - 1/2| holds, if that is under 1/4.
+    so the one with the smaller median distance |c / size - 1/2| holds, if that is under `OFF_CENTRE`.
 
     Args:
         image: (width, height) of most images at hand.
@@ -208,7 +211,7 @@ def krt_reference(
     offsets = {size: float(np.abs(points / size - 0.5).max()) for size in (image, FULL_SIZE)}
     best = min(offsets, key=offsets.__getitem__)
     words = f"median principal point ({points[0]:.1f}, {points[1]:.1f})"
-    if offsets[best] > 0.25:
+    if offsets[best] > OFF_CENTRE:
         raise UserError(
             "cannot tell which image size KRT refers to",
             file=path,

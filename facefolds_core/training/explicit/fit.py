@@ -42,6 +42,7 @@ from facefolds_core.training.explicit.tracked import (
     WELL_SEEN,
     blend,
     mesh_radii,
+    some_frames,
     trusted_surface,
 )
 
@@ -55,6 +56,10 @@ MOVES_MARGIN = 4
 """Nodes of the radius maps around what moves, in which the layers reach as far."""
 MIN_VIEW_SHARE = 0.06
 """Of the training cameras: what a smaller share sees of a tracked mesh is its word alone."""
+WINDOW_NODES = 192
+"""Rows and columns of (u, v) at which it is asked whether there is something of the subject."""
+NEAR_NODES = 4
+"""Of these nodes around the points that cameras see: as far apart as a node or farther, these leave gaps."""
 WINDOW_MARGIN = 0.04
 """Margin of the window in u and v beyond what holds the subject."""
 MAX_HALFWIDTH_PIXELS = 8.0
@@ -190,16 +195,17 @@ def fit_window(volume: Volume, chart: Chart, points: Array, vertices: Array | No
         UserError: if there is nothing.
     """
     limits = whole_window(chart, params)
-    uv, least = window_uv(limits, 192, 192), params.subject_opacity
+    uv, least = window_uv(limits, WINDOW_NODES, WINDOW_NODES), params.subject_opacity
+    last = WINDOW_NODES - 1
     highest, lowest = np.array([limits[1], limits[3]]), np.array([limits[0], limits[2]])
-    nodes = np.rint((chart.uv(points)[0] - lowest) / (highest - lowest) * 191).astype(int)
-    nodes = nodes[((nodes >= 0) & (nodes <= 191)).all(1)]
-    seen = np.zeros((192, 192), bool)
-    seen[191 - nodes[:, 0], nodes[:, 1]] = True
-    near = ndimage.binary_dilation(seen, iterations=4)
+    nodes = np.rint((chart.uv(points)[0] - lowest) / (highest - lowest) * last).astype(int)
+    nodes = nodes[((nodes >= 0) & (nodes <= last)).all(1)]
+    seen = np.zeros((WINDOW_NODES, WINDOW_NODES), bool)
+    seen[last - nodes[:, 0], nodes[:, 1]] = True
+    near = ndimage.binary_dilation(seen, iterations=NEAR_NODES)
     held = [uv[near & (profile(volume, chart, uv, least).opacity >= least)]]
     if vertices is not None:
-        places, _ = chart.uv(vertices[:: max(1, len(vertices) // 12)].reshape(-1, 3))
+        places, _ = chart.uv(some_frames(vertices).reshape(-1, 3))
         held.append(places[((places >= lowest) & (places <= highest)).all(1) & (np.abs(places[:, 1]) <= 1)])
     places, margin = np.concatenate(held), WINDOW_MARGIN
     if not len(places):
@@ -219,12 +225,16 @@ def greatest_halfwidth(params: GeometryParams, pixel: float) -> float:
     return max(params.halfwidth, min(params.max_halfwidth, MAX_HALFWIDTH_PIXELS * pixel))
 
 
+WIDTH_BLUR = 4.0
+"""Smoothing of the halfwidths, standard deviation, nodes: the spread found is noisy, and layers must not be."""
+
+
 def spread(seen: Profile, middle: Array, least: float, most: float, voxel: float) -> Array:
     """Halfwidths: the least one, plus half of the spread of the volume's opacity beyond the three voxels that a sharp
     surface has in it, plus the distance of the middle from the volume's beyond a voxel; smoothed."""
     thick = np.nan_to_num(0.5 * np.clip(seen.outer - seen.inner - 3 * voxel, 0, None))
     off = np.nan_to_num(np.clip(np.abs(seen.radius - middle) - voxel, 0, None))
-    wide: Array = ndimage.gaussian_filter(least + thick + off, 4.0, mode="nearest").clip(least, most)
+    wide: Array = ndimage.gaussian_filter(least + thick + off, WIDTH_BLUR, mode="nearest").clip(least, most)
     return wide
 
 
@@ -255,6 +265,13 @@ def least_middle(halfwidth: Array, params: GeometryParams) -> Array:
     return MIN_RADIUS + max(params.rounds) * halfwidth
 
 
+FILL_BLURS = (32, 16, 8, 4, 2, 1)
+"""Standard deviations, nodes, from coarse to fine: the first bridges the widest gaps of a map of 384 nodes, the last
+leaves no crease at a gap's border."""
+FILL_ROUNDS = 8
+"""Of each of them, the known values put back after each."""
+
+
 def extrapolate(radii: Array) -> Array:
     """Fill NaN: the nearest known value, relaxed from coarse to fine with the known ones held."""
     missing = np.isnan(radii)
@@ -262,8 +279,8 @@ def extrapolate(radii: Array) -> Array:
         return radii
     nearest = ndimage.distance_transform_edt(missing, return_distances=False, return_indices=True)
     filled: Array = radii[tuple(nearest)]
-    for sigma in (32, 16, 8, 4, 2, 1):
-        for _ in range(8):
+    for sigma in FILL_BLURS:
+        for _ in range(FILL_ROUNDS):
             filled = np.where(missing, ndimage.gaussian_filter(filled, sigma, mode="nearest"), radii)
     return filled
 
@@ -280,6 +297,13 @@ def pixel_size(scene: Scene) -> float:
     """Of the median training camera at the origin, units."""
     cameras = [scene.cameras[i] for i in scene.indices("train")]
     return float(np.median([np.linalg.norm(c.centre) / c.K[0, 0] for c in cameras]))
+
+
+RECENTRE_SCALES = (16.0, 4.0, 1.0)
+"""Smoothings from coarse to fine, times `blur`: a direction with nothing opaque follows what lies far away."""
+ENOUGH_OPACITY = 0.1
+"""Opacity that a scale must hold near a node to decide alone, a tenth of a layer's; with less the coarser one does in
+proportion."""
 
 
 def recentre(radii: Array, alpha: NDArray[np.float32], blur: float) -> Array:
@@ -302,10 +326,9 @@ def recentre(radii: Array, alpha: NDArray[np.float32], blur: float) -> Array:
     middle = 0.5 * (radii[..., 0] + radii[..., -1])
     moment = (weights * (radii - middle[..., None])).sum(-1)
     moved = np.zeros_like(middle)
-    # From coarse to fine: where a scale holds less opacity than a tenth of a layer, the coarser one decides.
-    for scale in (16.0, 4.0, 1.0):
+    for scale in RECENTRE_SCALES:
         near = ndimage.gaussian_filter(mass, scale * blur, mode="nearest")
         found = ndimage.gaussian_filter(moment, scale * blur, mode="nearest") / np.maximum(near, 1e-9)
-        trust = np.clip(near / 0.1, 0, 1)
+        trust = np.clip(near / ENOUGH_OPACITY, 0, 1)
         moved = trust * found + (1 - trust) * moved
     return moved

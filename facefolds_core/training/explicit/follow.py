@@ -23,7 +23,7 @@ from facefolds_core.training.explicit import follow_kernel, shading_kernel
 from facefolds_core.training.explicit.rates import ALPHA_RATE, BETAS, falling
 from facefolds_core.training.explicit.state import MIN_ALPHA, MIN_LIGHT, TextureState
 from facefolds_core.training.explicit.targets import CutOuts
-from facefolds_core.training.explicit.views import Rays, Views
+from facefolds_core.training.explicit.views import RaySource, Views
 
 Light = Callable[[TextureState, Views, int], None]
 """Sets the state's `shine` for rays of a frame."""
@@ -33,7 +33,7 @@ Errors = NDArray[np.float32]
 
 def follow(
     state: TextureState,
-    source: Rays,
+    source: RaySource,
     pictures: CutOuts,
     rates: NDArray[np.float32],
     light: Light,
@@ -63,7 +63,7 @@ def follow_rates(params: ExplicitParams) -> NDArray[np.float32]:
     return params.follow.rate * np.array([1, ALPHA_RATE], np.float32)
 
 
-def mean_errors(state: TextureState, source: Rays, pictures: CutOuts, frame: int, light: Light) -> Errors:
+def mean_errors(state: TextureState, source: RaySource, pictures: CutOuts, frame: int, light: Light) -> Errors:
     """(M, 3): mean C - I over the rays that meet each texel; 0 of texels that show less than half a ray."""
     (h, w), n = state.shape, state.layers.shape[2]
     sums, texture = state.gradient.numpy().reshape(n, h, w, 4), _texture(state, frame)
@@ -89,7 +89,7 @@ def lagging(errors: Errors, shape: tuple[int, int], least: float) -> NDArray[np.
 
 def follow_frame(
     state: TextureState,
-    source: Rays,
+    source: RaySource,
     pictures: CutOuts,
     frame: int,
     chosen: NDArray[np.bool_],
@@ -148,7 +148,7 @@ def _texture(state: TextureState, frame: int) -> NDArray[np.float32]:
 
 
 def _rays_on(
-    state: TextureState, source: Rays, frame: int, chosen: NDArray[np.bool_], light: Light
+    state: TextureState, source: RaySource, frame: int, chosen: NDArray[np.bool_], light: Light
 ) -> tuple[Views, NDArray[np.float32]]:
     """The rays of which enough light comes to chosen texels, and what the reflection adds to them. Texels that are
     transparent count as well: rays that end behind them are what keeps them so."""

@@ -16,20 +16,19 @@ from facefolds_core.model.reflection import Reflection
 from facefolds_core.params import ReflectionParams
 from facefolds_core.spacing import spread
 from facefolds_core.subject.outline import grid_shape
-from facefolds_core.training.explicit.plan import Level
+from facefolds_core.training.explicit.plan import TrainingLevel
 from facefolds_core.training.explicit.reflection import (
     GLOSS,
-    GlossParams,
+    GlossMethod,
     centred,
     fit_maps,
     gain_on_cameras,
     grounded,
-    smoothed,
 )
-from facefolds_core.training.explicit.reflection_maps import Maps, Seen, surface_normals
+from facefolds_core.training.explicit.reflection_maps import Maps, SeenRays, surface_normals
 from facefolds_core.training.explicit.state import TextureState
 from facefolds_core.training.explicit.targets import CutOuts
-from facefolds_core.training.explicit.views import Rays, StillRays, Views
+from facefolds_core.training.explicit.views import RaySource, StillRays, Views
 
 
 class GlossFit:
@@ -52,7 +51,7 @@ class GlossFit:
         window: Window,
         params: ReflectionParams,
         poses: Track | None,
-        how: GlossParams = GLOSS,
+        how: GlossMethod = GLOSS,
         photographed: int | None = None,
     ) -> None:
         self._photographed = photographed
@@ -61,7 +60,7 @@ class GlossFit:
         self.maps: Maps | None = None
         self._normals: NDArray[np.float32] | None = None
 
-    def follow(self, state: TextureState, source: Rays, pictures: CutOuts, middle: torch.Tensor) -> None:
+    def follow(self, state: TextureState, source: RaySource, pictures: CutOuts, middle: torch.Tensor) -> None:
         """New crossings, and perhaps a new middle radius: normals, and what the reflection adds to each ray."""
         if not self.on:
             return
@@ -80,12 +79,12 @@ class GlossFit:
             return
         state.shine = self.maps.on_rays(views, self.poses.at(frame).rotation)
 
-    def due(self, step: int, level: Level) -> bool:
+    def due(self, step: int, level: TrainingLevel) -> bool:
         """Whether to fit after this step of a level: `fits` times, the last after its last one."""
         fits, steps = self.params.fits, level.iterations
         return self.on and self.params.begin == "rounds" and (step + 1) * fits // steps > step * fits // steps
 
-    def after(self, number: int, rounds: int, state: TextureState, source: Rays, pictures: CutOuts) -> Fact | None:
+    def after(self, number: int, rounds: int, state: TextureState, source: RaySource, pictures: CutOuts) -> Fact | None:
         """After level `number`, of which `rounds` are of geometry: where it is time, whether there is one; with
         `begin: end` it is fitted now."""
         if not self.on or number != (rounds - 1 if self.params.begin == "rounds" else rounds + 1):
@@ -96,11 +95,11 @@ class GlossFit:
             self._fit(state, seen, done=True)
         return found
 
-    def fit(self, state: TextureState, source: Rays, pictures: CutOuts, done: bool) -> None:
+    def fit(self, state: TextureState, source: RaySource, pictures: CutOuts, done: bool) -> None:
         """Fit to what the textures leave over now; `done` if they are trained no more."""
         self._fit(state, self.look(state, source, pictures), done)
 
-    def _fit(self, state: TextureState, seen: Seen, done: bool) -> None:
+    def _fit(self, state: TextureState, seen: SeenRays, done: bool) -> None:
         used = self._used(seen)
         if not np.isfinite(used.residual).all():
             return  # the textures diverge: the next step says so
@@ -111,20 +110,19 @@ class GlossFit:
         start = Maps.blank(self._normals, self.params) if first else self.maps
         assert start is not None
         rounds = self.how.first_rounds if first else self.how.rounds
-        how = smoothed(self.how, self.smoother)
-        maps = grounded(fit_maps(used, start, rounds, how))
+        maps = grounded(fit_maps(used, start, rounds, self.how, self.smoother))
         # Textures that are still trained would follow an offset that takes up what they leave over.
-        self.maps = maps if done else centred(maps, used, how)
+        self.maps = maps if done else centred(maps, used, self.how, self.smoother)
         self._shine(state, seen)
 
-    def _decide(self, state: TextureState, seen: Seen) -> Fact:
+    def _decide(self, state: TextureState, seen: SeenRays) -> Fact:
         """Whether the reflection helps on cameras that its fit did not see, or a smoother one does more: it is fitted
         anew then. If neither does there is none from here on."""
         assert self._normals is not None
         start, used, least = Maps.blank(self._normals, self.params), self._used(seen), self.how.min_gain
         gain = smooth = gain_on_cameras(used, start, self.how)
         if gain < self.how.sure_gain:
-            smooth = gain_on_cameras(used, start, smoothed(self.how, self.how.smoother))
+            smooth = gain_on_cameras(used, start, self.how, self.how.smoother)
         if gain >= max(least, smooth):
             return fact("reflection", gain=gain, least=least)
         begun, self.maps, state.shine = self.maps is not None, None, np.zeros((0, 3), np.float32)
@@ -140,7 +138,7 @@ class GlossFit:
         """What the model gets."""
         return None if self.maps is None else self.maps.model()
 
-    def look(self, state: TextureState, source: Rays, pictures: CutOuts) -> Seen:
+    def look(self, state: TextureState, source: RaySource, pictures: CutOuts) -> SeenRays:
         """What textures leave over, on rays for a fit."""
         if self.poses is not None:
             return self._look_in_turns(state, source, pictures, self.poses)
@@ -150,9 +148,9 @@ class GlossFit:
         frames = spread(range(len(state.steps)), self.how.frames)
         for frame in frames:
             state.look(views, pictures, frame, sums)
-        return Seen.of(views.camera, views.directions, sums, len(frames)).filled(views)
+        return SeenRays.of(views.camera, views.directions, sums, len(frames)).filled(views)
 
-    def _look_in_turns(self, state: TextureState, source: Rays, pictures: CutOuts, poses: Track) -> Seen:
+    def _look_in_turns(self, state: TextureState, source: RaySource, pictures: CutOuts, poses: Track) -> SeenRays:
         """Of some rays of each of some frames, as many as a fit takes: in each frame the room shines from elsewhere.
 
         Frames are looked at twice. What all their rays see would take up to a gigabyte; how many are opaque, and so
@@ -169,10 +167,10 @@ class GlossFit:
             views = source.part(frame, 0, 1)[0].part(there[-before % step :: step])
             before += len(there)
             turn = np.asarray(poses.at(frame).rotation, np.float32)
-            found.append(Seen.of(views.camera, views.directions, _seen(state, views, pictures, frame), 1, turn))
-        return Seen.together(found)
+            found.append(SeenRays.of(views.camera, views.directions, _seen(state, views, pictures, frame), 1, turn))
+        return SeenRays.together(found)
 
-    def _used(self, seen: Seen) -> Seen:
+    def _used(self, seen: SeenRays) -> SeenRays:
         """The rays of a fit."""
         counts = seen.opacity >= self.how.min_opacity
         if self._photographed is not None:
@@ -184,7 +182,7 @@ class GlossFit:
         """One of so many of `count` rays is used."""
         return max(1, -(-count // self.how.rays))
 
-    def _shine(self, state: TextureState, seen: Seen) -> None:
+    def _shine(self, state: TextureState, seen: SeenRays) -> None:
         assert self.maps is not None
         if self.poses is None:
             state.shine = self.maps.added(seen)

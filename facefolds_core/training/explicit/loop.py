@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from facefolds_core.captures.scene import Scene, Split
 from facefolds_core.facts import Fact, fact
 from facefolds_core.model.device import CPU
-from facefolds_core.params import ExplicitParams, SubjectParams
+from facefolds_core.params import ExplicitParams
 from facefolds_core.progress import progress
-from facefolds_core.subject.find import found_in, subject_in
+from facefolds_core.subject.find import DEFAULT_SUBJECT, found_in, subject_in
 from facefolds_core.training.checkpoints import fingerprint
 from facefolds_core.training.explicit.cameras import choose_cameras
 from facefolds_core.training.explicit.fit import Fit, fit_scene
@@ -64,7 +64,7 @@ def fit_with_surroundings(scene: Scene, params: ExplicitParams, log: Path) -> tu
     """`fit_explicit`, and what else was found out."""
     check_images(scene)
     with TemporaryDirectory() as folder:
-        scene = found_in(scene, SubjectParams(seed=params.seed), Path(folder) / "subject")
+        scene = found_in(scene, DEFAULT_SUBJECT, Path(folder) / "subject")
         return _fit(scene, params, log)
 
 
@@ -103,7 +103,7 @@ def _fit(scene: Scene, params: ExplicitParams, log: Path) -> tuple[Trained, Surr
         trainer.psnr,
     )
     surroundings = Surroundings(cameras.scene.splits, cameras.gains, trainer.usual)
-    return Trained(model, spec, report, trainer.summary(spec)), surroundings
+    return Trained(model, spec, report, params, trainer.summary(spec)), surroundings
 
 
 def warnings_of(scene: Scene, fit: Fit) -> tuple[Fact, ...]:

@@ -26,7 +26,7 @@ ROUND_RAYS = 250_000
 
 
 @dataclass(frozen=True)
-class Level:
+class TrainingLevel:
     """One stretch of training.
 
     Attributes:
@@ -63,7 +63,7 @@ def epochs(frames: int, random: np.random.Generator) -> Iterator[int]:
         yield from reversed(random.permutation(frames).tolist())
 
 
-def plan(fit: Fit, params: ExplicitParams, frames: int, pixels: int) -> list[Level]:
+def plan(fit: Fit, params: ExplicitParams, frames: int, pixels: int) -> list[TrainingLevel]:
     """Rounds of geometry at a quarter of the resolution; half and full resolution, with their steps a frame.
 
     Args:
@@ -79,11 +79,11 @@ def plan(fit: Fit, params: ExplicitParams, frames: int, pixels: int) -> list[Lev
 
     geometry = params.geometry
     stride = max(1, min(ROUND_STRIDE, pixels // ROUND_RAYS))
-    levels = [Level(size(4), geometry.round_iterations, stride, scale, False) for scale in geometry.rounds]
+    levels = [TrainingLevel(size(4), geometry.round_iterations, stride, scale, False) for scale in geometry.rounds]
     rounds, least = geometry.round_iterations * len(levels), params.textures.steps_per_frame * frames
     rest = max(max(params.iterations, params.least_iterations) - rounds, least)
     pace = min(1.0, max(params.textures.full_rate_iterations - rounds, least, 1) / rest)
     half = round(HALF_SHARE * rest)
-    levels.append(Level(size(2), half, 1, geometry.rounds[-1], False, pace))
-    levels.append(Level(fit.texels, max(rest - half, frames), 1, geometry.rounds[-1], True, pace))
+    levels.append(TrainingLevel(size(2), half, 1, geometry.rounds[-1], False, pace))
+    levels.append(TrainingLevel(fit.texels, max(rest - half, frames), 1, geometry.rounds[-1], True, pace))
     return levels

@@ -19,14 +19,14 @@ from numpy.typing import NDArray
 from scipy.linalg import solveh_banded
 
 from facefolds_core.training.explicit.reflection_kernel import normal_equations
-from facefolds_core.training.explicit.reflection_maps import Array, Maps, Seen, values_at
+from facefolds_core.training.explicit.reflection_maps import Array, Maps, SeenRays, values_at
 
 TILT_STEP = 0.01
 """By which normals lean to find how the reflection follows them: under a tenth of a texel of the environment."""
 
 
 @dataclass(frozen=True)
-class GlossParams:
+class GlossMethod:
     """How the reflection is fitted, and how it is asked whether there is one.
 
     Attributes:
@@ -68,13 +68,18 @@ class GlossParams:
     min_gain: float = 0.05
 
 
-GLOSS = GlossParams()
+GLOSS = GlossMethod()
 
 
-def fit_maps(seen: Seen, start: Maps, rounds: int, params: GlossParams) -> Maps:
+def fit_maps(seen: SeenRays, start: Maps, rounds: int, how: GlossMethod, smoother: float = 1.0) -> Maps:
     """Gloss, offset, environment and the tilt of the normals that explain the residuals; the surface is that of
-    `start`."""
-    o, clip = seen.opacity, params.max_residual
+    `start`.
+
+    Args:
+        smoother: times as smooth as usual gloss, offset and environment are.
+    """
+    gloss_smoothness, environment_smoothness = smoother * how.gloss_smoothness, smoother * how.environment_smoothness
+    o, clip = seen.opacity, how.max_residual
     wanted = seen.residual.clip(-clip, clip)
     maps = start
     for _ in range(rounds):
@@ -83,23 +88,23 @@ def fit_maps(seen: Seen, start: Maps, rounds: int, params: GlossParams) -> Maps:
         reflecting = o * values_at(gloss[..., None], seen.st)[:, 0]
         target = wanted + o[:, None] * values_at(offset, seen.st)
         environment = _solve(
-            places, reflecting**2, reflecting[:, None] * target, environment.shape[:2], params.environment_smoothness
+            places, reflecting**2, reflecting[:, None] * target, environment.shape[:2], environment_smoothness
         )
         light = values_at(environment, places)
         along = (light * target).sum(1, keepdims=True) * o[:, None]
-        gloss = _solve(seen.st, (o * o) * (light**2).sum(1), along, gloss.shape, params.gloss_smoothness)[..., 0]
+        gloss = _solve(seen.st, (o * o) * (light**2).sum(1), along, gloss.shape, gloss_smoothness)[..., 0]
         gloss = np.maximum(gloss, np.float32(0))
         mean = np.float32(max(float(gloss.mean()), 1e-6))
         gloss, environment, light = gloss / mean, environment * mean, light * mean
         left = o[:, None] * values_at(gloss[..., None], seen.st) * light - wanted
-        offset = _solve(seen.st, o * o, o[:, None] * left, gloss.shape, params.gloss_smoothness)
+        offset = _solve(seen.st, o * o, o[:, None] * left, gloss.shape, gloss_smoothness)
         maps = replace(maps, gloss=gloss, offset=offset, environment=environment)
         for axis in (0, 1):
-            maps = _lean(maps, seen, wanted, axis, params)
+            maps = _lean(maps, seen, wanted, axis, how)
     return maps
 
 
-def _lean(maps: Maps, seen: Seen, wanted: Array, axis: int, params: GlossParams) -> Maps:
+def _lean(maps: Maps, seen: SeenRays, wanted: Array, axis: int, how: GlossMethod) -> Maps:
     """The same with another tilt along one tangent: a Gauss-Newton step, kept within `max_tilt`."""
     step = np.zeros((1, 1, 2), np.float32)
     step[..., axis] = TILT_STEP
@@ -108,9 +113,9 @@ def _lean(maps: Maps, seen: Seen, wanted: Array, axis: int, params: GlossParams)
     slope = (further - now) / np.float32(TILT_STEP)
     target = wanted - now + slope * values_at(own, seen.st)
     weight = (slope * slope).sum(1)
-    found = _solve(seen.st, weight, (slope * target).sum(1, keepdims=True), own.shape[:2], params.normal_smoothness)
+    found = _solve(seen.st, weight, (slope * target).sum(1, keepdims=True), own.shape[:2], how.normal_smoothness)
     tilt = maps.tilt.copy()
-    tilt[..., axis] = found[..., 0].clip(-params.max_tilt, params.max_tilt)
+    tilt[..., axis] = found[..., 0].clip(-how.max_tilt, how.max_tilt)
     return replace(maps, tilt=tilt)
 
 
@@ -120,38 +125,28 @@ def grounded(maps: Maps) -> Maps:
     return replace(maps, environment=maps.environment - darkest, offset=maps.offset - maps.gloss[..., None] * darkest)
 
 
-def centred(maps: Maps, seen: Seen, params: GlossParams) -> Maps:
+def centred(maps: Maps, seen: SeenRays, how: GlossMethod, smoother: float = 1.0) -> Maps:
     """The same with the offset that leaves the mean over the rays at every place as it is without reflections."""
     light = values_at(maps.environment, maps.positions(seen)) * values_at(maps.gloss[..., None], seen.st)
     weight = seen.opacity**2
-    offset = _solve(seen.st, weight, weight[:, None] * light, maps.gloss.shape, params.gloss_smoothness)
+    offset = _solve(seen.st, weight, weight[:, None] * light, maps.gloss.shape, smoother * how.gloss_smoothness)
     return replace(maps, offset=offset)
 
 
-def gain_on_cameras(seen: Seen, start: Maps, params: GlossParams) -> float:
+def gain_on_cameras(seen: SeenRays, start: Maps, how: GlossMethod, smoother: float = 1.0) -> float:
     """dB that the reflection wins on rays of cameras that its fit did not see, each camera left out once."""
-    params = smoothed(params, params.asked_smoothness)
     before = after = 0.0
-    for fold in range(params.folds):
-        out = seen.camera % params.folds == fold
+    for fold in range(how.folds):
+        out = seen.camera % how.folds == fold
         if out.all() or not out.any():
             continue
-        maps = fit_maps(seen.part(~out), start, params.first_rounds, params)
+        maps = fit_maps(seen.part(~out), start, how.first_rounds, how, smoother * how.asked_smoothness)
         unseen = seen.part(out)
         added = unseen.opacity[:, None] * maps.added(unseen)
-        clipped = unseen.residual.clip(-params.max_residual, params.max_residual).astype(np.float64)
+        clipped = unseen.residual.clip(-how.max_residual, how.max_residual).astype(np.float64)
         before += float((clipped**2).sum())
         after += float(((clipped - added) ** 2).sum())
     return 10 * float(np.log10(before / after)) if after > 0 and before > 0 else 0.0
-
-
-def smoothed(params: GlossParams, factor: float) -> GlossParams:
-    """With the smoothnesses of gloss, offset and environment times `factor`."""
-    return replace(
-        params,
-        gloss_smoothness=factor * params.gloss_smoothness,
-        environment_smoothness=factor * params.environment_smoothness,
-    )
 
 
 def _solve(st: Array, weight: Array, wish: Array, shape: tuple[int, ...], smoothness: float) -> Array:

@@ -25,9 +25,12 @@ Array = NDArray[np.float32]
 AT_ONCE = 1 << 20
 """Rays that are looked at together: bounds the memory."""
 
+CLEAR = 0.1
+"""A ray that is less opaque shows no place: the mean of where it meets the layers is mostly what noise there is."""
+
 
 @dataclass(frozen=True)
-class Seen:
+class SeenRays:
     """P rays, mean over frames.
 
     Attributes:
@@ -50,7 +53,7 @@ class Seen:
     @classmethod
     def of(
         cls, camera: NDArray[np.int32], directions: Array, sums: Array, frames: int, turn: Array | None = None
-    ) -> Seen:
+    ) -> SeenRays:
         """From the sums (P, 6) of `reflection_kernel.look` over some frames; `turn`: (3, 3) of all its rays."""
         st = np.asarray(sums[:, 4:] / np.maximum(sums[:, 3:4], 1e-6), np.float32)
         mean = np.asarray(sums / frames, np.float32)
@@ -58,7 +61,7 @@ class Seen:
         return cls(camera, directions, st, mean[:, 3], mean[:, :3], turns)
 
     @classmethod
-    def middle(cls, views: Views, turn: NDArray[np.floating] | None = None) -> Seen:
+    def middle(cls, views: Views, turn: NDArray[np.floating] | None = None) -> SeenRays:
         """Rays taken to be opaque where they cross the layer nearest to the middle one; no residuals are known."""
         count, layers = views.codes.shape[:2]
         at = np.zeros((count, 2), np.uint16)
@@ -69,18 +72,18 @@ class Seen:
         nothing = np.zeros((count, 3), np.float32)
         return cls(views.camera, views.directions, st, np.ones(count, np.float32), nothing, turns)
 
-    def filled(self, views: Views) -> Seen:
+    def filled(self, views: Views) -> SeenRays:
         """The same rays; those that are clear, and show no place, are taken to reflect at the layer in the middle."""
-        return replace(self, st=np.where(self.opacity[:, None] < 0.1, Seen.middle(views).st, self.st))
+        return replace(self, st=np.where(self.opacity[:, None] < CLEAR, SeenRays.middle(views).st, self.st))
 
     @classmethod
-    def together(cls, parts: Sequence[Seen]) -> Seen:
+    def together(cls, parts: Sequence[SeenRays]) -> SeenRays:
         """The rays of several, which all have turns."""
         names = [field.name for field in fields(cls)]
         return cls(**{name: np.concatenate([getattr(part, name) for part in parts]) for name in names})
 
-    def part(self, chosen: NDArray[Any]) -> Seen:
-        return Seen(
+    def part(self, chosen: NDArray[Any]) -> SeenRays:
+        return SeenRays(
             self.camera[chosen],
             self.directions[chosen],
             self.st[chosen],
@@ -118,7 +121,7 @@ class Maps:
         gloss, offset, tilt, environment = (np.zeros(shape, np.float32) for shape in shapes)
         return cls(gloss + 1, offset, surface, tilt, environment)
 
-    def positions(self, seen: Seen) -> Array:
+    def positions(self, seen: SeenRays) -> Array:
         """(P, 2) in the environment."""
         out = np.empty((len(seen.st), 2), np.float32)
         st, directions = np.ascontiguousarray(seen.st), np.ascontiguousarray(seen.directions)
@@ -126,7 +129,7 @@ class Maps:
         reflect(st, directions, turns, self.normals, out)
         return out
 
-    def added(self, seen: Seen) -> Array:
+    def added(self, seen: SeenRays) -> Array:
         """(P, 3), as `Reflection.added`."""
         light, st = values_at(self.environment, self.positions(seen)), seen.st
         return np.asarray(values_at(self.gloss[..., None], st) * light - values_at(self.offset, st), np.float32)
@@ -137,7 +140,7 @@ class Maps:
         parts = (
             views.part(np.arange(i, min(i + AT_ONCE, len(views.pixel)))) for i in range(0, len(views.pixel), AT_ONCE)
         )
-        found = [self.added(Seen.middle(part, turn)) for part in parts]
+        found = [self.added(SeenRays.middle(part, turn)) for part in parts]
         return np.concatenate(found) if found else np.zeros((0, 3), np.float32)
 
     @classmethod

@@ -29,8 +29,17 @@ NODES = 128
 """Rows and columns of (u, v) at which mesh and Gaussians are compared."""
 TRUST = 0.004
 """The mesh is kept where the opacity found lies nearer than this, units; farther offsets lose as much."""
+MESH_FRAMES = 12
+"""Frames of a tracked mesh that are looked at, at least: the mean of more is much the same, and each costs a cast."""
+BORDER = 10
+"""Nodes from the border inwards over which the mesh takes over from the volume."""
 OPACITY = 0.9
 """At the start, where only the mesh has a surface."""
+
+
+def some_frames(vertices: Array) -> Array:
+    """Of vertices (K, V, 3), `MESH_FRAMES` to twice as many, evenly spread."""
+    return vertices[:: max(1, len(vertices) // MESH_FRAMES)]
 
 
 def trusted_surface(
@@ -63,7 +72,7 @@ def mesh_radii(vertices: Array, faces: NDArray[np.int32], chart: Chart, uv: Arra
     vertices (K, V, 3), units; NaN where no frame's mesh has a point on that ray."""
     origins, flat = (of(uv).reshape(-1, 3) for of in (chart.origins, chart.directions))
     total, count = np.zeros(len(flat)), np.zeros(len(flat))
-    for frame in vertices[:: max(1, len(vertices) // 12)]:
+    for frame in some_frames(vertices):
         mesh = trimesh.Trimesh(frame, faces, process=False)
         start = 2 * float(np.linalg.norm(frame - np.array(chart.centre), axis=1).max())
         points, ray, _ = mesh.ray.intersects_location(origins + start * flat, -flat, multiple_hits=False)
@@ -86,8 +95,7 @@ def blend(mesh: Array, volume: Array, reach: float | Array) -> tuple[Array, Arra
         radii (NaN where neither has one), and the share of the mesh in them, 0 to 1.
     """
     close = np.isfinite(mesh) & ~(volume - mesh > reach)
-    # Ten nodes inside the border the mesh rules alone.
-    kept = np.clip(ndimage.distance_transform_edt(close) / 10, 0, 1)
+    kept = np.clip(ndimage.distance_transform_edt(close) / BORDER, 0, 1)
     kept = np.where(np.isnan(volume), close.astype(np.float64), kept)
     filled = np.where(np.isnan(volume), mesh, volume)
     return np.where(

@@ -18,19 +18,19 @@ from facefolds_core.model.radial import RadialManifolds
 from facefolds_core.model.radiance import RadianceManifolds
 from facefolds_core.model.storage import ExplicitSpec
 from facefolds_core.params import ExplicitParams
-from facefolds_core.subject.outline import texel_uv
+from facefolds_core.subject.outline import texel_middles
 from facefolds_core.subject.volume import Volume
 from facefolds_core.training.explicit.cameras import CameraChoice
 from facefolds_core.training.explicit.fit import Fit, least_middle, recentre, volume_in
 from facefolds_core.training.explicit.follow import follow, follow_rates
 from facefolds_core.training.explicit.gloss import GlossFit
-from facefolds_core.training.explicit.plan import SETTLING, Level, epochs
+from facefolds_core.training.explicit.plan import SETTLING, TrainingLevel, epochs
 from facefolds_core.training.explicit.rates import falling, rates_of
 from facefolds_core.training.explicit.second_surface import LAYERS, second_layers, shells_of_both
 from facefolds_core.training.explicit.state import MIN_ALPHA, TextureState, on_one_thread
 from facefolds_core.training.explicit.targets import CutOuts
 from facefolds_core.training.explicit.teacher import Teacher
-from facefolds_core.training.explicit.views import MovingRays, Rays, StillRays, trace_views
+from facefolds_core.training.explicit.views import MovingRays, RaySource, StillRays, trace_views
 from facefolds_core.training.log import log_metrics
 
 ERROR_RATIO, SMOOTHING = 9.0, 0.1
@@ -68,7 +68,7 @@ class Trainer:
         self.layers = params.layers + (LAYERS if fit.second.any() else 0)
         self.middle = torch.from_numpy(fit.middle).float()
         self.geometry = 0.0
-        self.views: Rays | None = None
+        self.views: RaySource | None = None
         self.stride = 0
         self.state: TextureState | None = None
         self.iteration = self.rays = 0
@@ -91,7 +91,7 @@ class Trainer:
         fit = self.fit
         return RadialManifolds(fit.chart, fit.window, middle, halfwidth, count, second, fit.torso)
 
-    def run(self, level: Level, number: int, live: Live, bar: tqdm) -> None:
+    def run(self, level: TrainingLevel, number: int, live: Live, bar: tqdm) -> None:
         """One level.
 
         Raises:
@@ -112,7 +112,7 @@ class Trainer:
             self.events.append(found)
             bar.write(f"train: {found}")
 
-    def _prepare(self, level: Level) -> None:
+    def _prepare(self, level: TrainingLevel) -> None:
         """Geometry, stored crossings and grids of this level."""
         moved = self.geometry != level.geometry
         if moved and self.state is not None:
@@ -131,7 +131,7 @@ class Trainer:
         if new_rays:
             self.gloss.follow(self.state, self.views, self.pictures, self.middle)
 
-    def _trace(self, level: Level) -> None:
+    def _trace(self, level: TrainingLevel) -> None:
         finest = level.texels if level.stride > 1 else self.fit.texels
         share = self.params.textures.rays_per_texel * finest[0] * finest[1]
         self.geometry, self.stride = level.geometry, level.stride
@@ -149,7 +149,7 @@ class Trainer:
         with on_one_thread():
             nodes = self.manifolds().radii().detach().permute(2, 0, 1)[None]
             radii = torch.nn.functional.interpolate(nodes, size=shape, mode="bilinear", align_corners=False)
-        places, uv = radii[0].permute(1, 2, 0).double().numpy(), texel_uv(self.fit.window, *shape)
+        places, uv = radii[0].permute(1, 2, 0).double().numpy(), texel_middles(self.fit.window, *shape)
         flat = shape[0] * shape[1], places.shape[-1]
 
         def held(volume: Volume) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
@@ -188,7 +188,7 @@ class Trainer:
             moved, torch.from_numpy(least_middle(self.fit.halfwidth, self.params.geometry) + self.fit.reach).float()
         )
 
-    def _step(self, level: Level, number: int, live: Live, bar: tqdm) -> None:
+    def _step(self, level: TrainingLevel, number: int, live: Live, bar: tqdm) -> None:
         """A level's iterations."""
         assert self.state is not None and self.views is not None
         stride, frames = self._stride(), epochs(self.scene.num_frames, self.random)
@@ -302,7 +302,7 @@ class Trainer:
         }
 
 
-def _diverged(number: int, level: Level, rate: float) -> UserError:
+def _diverged(number: int, level: TrainingLevel, rate: float) -> UserError:
     return UserError(
         "training diverged",
         place=f"level {number} ({level.texels[0]} x {level.texels[1]} texels), learning rate {rate:.3g}",

@@ -193,7 +193,7 @@ def check_images(scene: Scene) -> None:
                 )
 
 
-class Rays(Protocol):
+class RaySource(Protocol):
     """The rays of all training cameras in any frame.
 
     Attributes:
@@ -226,7 +226,7 @@ class StillRays:
         return self.views, np.arange(phase, self.count, parts)
 
     def in_use(self, frame: int) -> Iterator[Views]:
-        """See `Rays`."""
+        """See `RaySource`."""
         yield self.views
 
 
@@ -277,7 +277,7 @@ class MovingRays:
         self._used = min(self.shares, shares)
 
     def part(self, frame: int, phase: int, parts: int) -> tuple[Views, NDArray[np.int64]]:
-        """See `Rays`. Of the shares of a frame only some are in use, in each frame others."""
+        """See `RaySource`. Of the shares of a frame only some are in use, in each frame others."""
         turn, rest = phase % self._used, phase // self._used
         number = (self._first + frame * self._used + turn) % self.shares
         views = self._kept.get((frame, number))
@@ -300,7 +300,7 @@ class MovingRays:
         return views
 
     def in_use(self, frame: int) -> Iterator[Views]:
-        """See `Rays`; share by share."""
+        """See `RaySource`; share by share."""
         for turn in range(self._used):
             yield self.part(frame, turn, 1)[0]
 

@@ -19,7 +19,7 @@ from facefolds_core.training.explicit.follow import follow_frame, follow_rates, 
 from facefolds_core.training.explicit.rates import falling, rates_of
 from facefolds_core.training.explicit.state import MIN_ALPHA, TextureState
 from facefolds_core.training.explicit.targets import CutOuts
-from facefolds_core.training.explicit.views import MovingRays, Rays, StillRays, Views, trace_views
+from facefolds_core.training.explicit.views import MovingRays, RaySource, StillRays, Views, trace_views
 from facefolds_core.training.segments.base import Base
 
 
@@ -102,7 +102,7 @@ class FrameFitter:
         if self.maps is not None and self.scene.poses is not None:
             self.state.shine = self.maps.on_rays(seen, self.scene.poses.at(frame).rotation)
 
-    def _follow(self, frame: int, views: Rays, pictures: CutOuts) -> None:
+    def _follow(self, frame: int, views: RaySource, pictures: CutOuts) -> None:
         """Where the frame does not follow yet what moves."""
         state, found = self.state, self.base.surroundings
 
@@ -122,7 +122,7 @@ class FrameFitter:
         state.frame_alpha[0, 0].copy_(alpha.view(len(state.frame_alpha[0, 0]), -1))
         state.steps[:] = 0
 
-    def _rays(self, frame: int, random: np.random.Generator) -> Rays:
+    def _rays(self, frame: int, random: np.random.Generator) -> RaySource:
         if self.still is not None:
             return self.still
         h, w = self.state.shape

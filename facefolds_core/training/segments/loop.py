@@ -22,9 +22,9 @@ from facefolds_core.model.device import CPU
 from facefolds_core.model.radiance import RadianceManifolds
 from facefolds_core.model.segmented import SegmentedTextures
 from facefolds_core.model.storage import ExplicitSpec
-from facefolds_core.params import ExplicitParams, SubjectParams
+from facefolds_core.params import ExplicitParams
 from facefolds_core.progress import progress
-from facefolds_core.subject.find import found_in
+from facefolds_core.subject.find import DEFAULT_SUBJECT, found_in
 from facefolds_core.training.checkpoints import fingerprint
 from facefolds_core.training.explicit.loop import fit_explicit
 from facefolds_core.training.explicit.views import check_images
@@ -63,7 +63,7 @@ def fit_take(scene: Scene, params: ExplicitParams, checkpoints: Path, log: Path,
     if told.key_frames is None:
         return fit_explicit(scene, params, log)
     with TemporaryDirectory() as found:
-        whole = found_in(scene, SubjectParams(seed=params.seed), Path(found) / "subject")
+        whole = found_in(scene, DEFAULT_SUBJECT, Path(found) / "subject")
         return _Take(whole, params, checkpoints / "take", log, told).run()
 
 
@@ -153,7 +153,8 @@ class _Take:
             psnr,
         )
         report = replace(report, processor_seconds=round(report.processor_seconds + sum(self.used.seconds.values()), 2))
-        return Trained(RadianceManifolds(base.manifolds, textures).eval(), spec, report, self._summary(base))
+        model = RadianceManifolds(base.manifolds, textures).eval()
+        return Trained(model, spec, report, self.params, self._summary(base))
 
     def _summary(self, base: Base) -> dict[str, Any]:
         """`fit.json`: the base's, and how the take was dealt into segments."""
