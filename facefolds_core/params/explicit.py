@@ -30,8 +30,9 @@ class StartParams(Section):
     centre_nodes: ClassVar[int] = 96
     """Rows of the coarse radius map by which charts are compared."""
 
-    window_limit: ClassVar[float] = 0.9
-    """Largest |u| of a window: at the poles a radius map has no meaning."""
+    window_limit: ClassVar[float] = 0.995
+    """Largest |u| of a window: at the pole itself a radius map has no meaning. What stays open is half a degree around
+    it, a millimetre of a crown."""
 
     column_limit: ClassVar[float] = 1.5
     """Largest -u of a window below a belt."""
