@@ -34,6 +34,9 @@ class StartParams(Section):
     """Largest |u| of a window: at the pole itself a radius map has no meaning. What stays open is half a degree around
     it, a millimetre of a crown."""
 
+    compared_limit: ClassVar[float] = 0.9
+    """Largest |u| of what charts are compared by: near the poles their nodes are too close to tell them apart."""
+
     column_limit: ClassVar[float] = 1.5
     """Largest -u of a window below a belt."""
 

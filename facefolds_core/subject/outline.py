@@ -140,10 +140,10 @@ def visible_points(volume: Volume, cameras: list[Camera], rays_per_camera: int =
     return np.concatenate(points)
 
 
-def whole_window(chart: Chart, params: StartParams) -> Window:
-    """Of all (u, v) that a chart may hold: with a belt there is no lower pole."""
-    lowest = params.window_limit if chart.belt is None else params.column_limit
-    return -lowest, params.window_limit, -params.azimuth_limit, params.azimuth_limit
+def whole_window(chart: Chart, params: StartParams, limit: float) -> Window:
+    """Of all (u, v) that a chart may hold, |u| up to `limit`: with a belt there is no lower pole."""
+    lowest = limit if chart.belt is None else params.column_limit
+    return -lowest, limit, -params.azimuth_limit, params.azimuth_limit
 
 
 def lost(volume: Volume, chart: Chart, points: Array, params: StartParams) -> Bool:
@@ -153,7 +153,7 @@ def lost(volume: Volume, chart: Chart, points: Array, params: StartParams) -> Bo
     direction by more than two voxels and what the surface's slope explains.
     """
     uv, radius = chart.uv(points)
-    u0, u1, v0, v1 = window = whole_window(chart, params)
+    u0, u1, v0, v1 = window = whole_window(chart, params, params.compared_limit)
     rows, columns = params.centre_nodes, max(2, round(params.centre_nodes * (v1 - v0) / (u1 - u0)))
     radii = profile(volume, chart, window_uv(window, rows, columns), params.subject_opacity).radius
     high = ndimage.maximum_filter(np.where(np.isnan(radii), -np.inf, radii), 3)

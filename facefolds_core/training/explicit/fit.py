@@ -194,7 +194,7 @@ def fit_window(volume: Volume, chart: Chart, points: Array, vertices: Array | No
     Raises:
         UserError: if there is nothing.
     """
-    limits = whole_window(chart, params)
+    limits = whole_window(chart, params, params.window_limit)
     uv, least = window_uv(limits, WINDOW_NODES, WINDOW_NODES), params.subject_opacity
     last = WINDOW_NODES - 1
     highest, lowest = np.array([limits[1], limits[3]]), np.array([limits[0], limits[2]])
