@@ -30,19 +30,18 @@ class StartParams(Section):
     centre_nodes: ClassVar[int] = 96
     """Rows of the coarse radius map by which charts are compared."""
 
-    window_limit: ClassVar[float] = 0.995
-    """Largest |u| of a window: at the pole itself a radius map has no meaning. What stays open is half a degree around
-    it, a millimetre of a crown."""
-
-    compared_limit: ClassVar[float] = 0.9
-    """Largest |u| of what charts are compared by: near the poles their nodes are too close to tell them apart."""
+    window_limit: ClassVar[float] = 0.9
+    """Largest |u| of a window: at the poles a radius map has no meaning."""
 
     column_limit: ClassVar[float] = 1.5
     """Largest -u of a window below a belt."""
 
-    azimuth_limit: ClassVar[float] = 2.0
-    """Largest |v| of a window; 1 is straight sideways from c, 2 straight backwards: a head that was filmed all around
-    is closed there."""
+    azimuth_limit: ClassVar[float] = 1.5
+    """Largest |v| of a window; 1 is straight sideways from c."""
+
+    around_limits: ClassVar[tuple[float, float]] = (0.995, 2.0)
+    """The same, |u| and |v|, of a subject that was filmed all around: it is closed behind, and above but for half a
+    degree, a millimetre of a crown."""
 
     subject_opacity: ClassVar[float] = 0.5
     """Opacity of the subject's Gaussians from which on a direction holds the subject."""

@@ -140,20 +140,25 @@ def visible_points(volume: Volume, cameras: list[Camera], rays_per_camera: int =
     return np.concatenate(points)
 
 
-def whole_window(chart: Chart, params: StartParams, limit: float) -> Window:
-    """Of all (u, v) that a chart may hold, |u| up to `limit`: with a belt there is no lower pole."""
-    lowest = limit if chart.belt is None else params.column_limit
-    return -lowest, limit, -params.azimuth_limit, params.azimuth_limit
+def whole_window(chart: Chart, params: StartParams, around: bool = False) -> Window:
+    """Of all (u, v) that a chart may hold: with a belt there is no lower pole.
+
+    Args:
+        around: the subject was filmed all around.
+    """
+    highest, aside = params.around_limits if around else (params.window_limit, params.azimuth_limit)
+    lowest = highest if chart.belt is None else params.column_limit
+    return -lowest, highest, -aside, aside
 
 
-def lost(volume: Volume, chart: Chart, points: Array, params: StartParams) -> Bool:
+def lost(volume: Volume, chart: Chart, points: Array, params: StartParams, around: bool = False) -> Bool:
     """(P,) whether no sheet over the chart can hold a visible point.
 
     They lie behind it or at its rim, nearer to c than layers may, or beneath or above the outermost surface in their
     direction by more than two voxels and what the surface's slope explains.
     """
     uv, radius = chart.uv(points)
-    u0, u1, v0, v1 = window = whole_window(chart, params, params.compared_limit)
+    u0, u1, v0, v1 = window = whole_window(chart, params, around)
     rows, columns = params.centre_nodes, max(2, round(params.centre_nodes * (v1 - v0) / (u1 - u0)))
     radii = profile(volume, chart, window_uv(window, rows, columns), params.subject_opacity).radius
     high = ndimage.maximum_filter(np.where(np.isnan(radii), -np.inf, radii), 3)
@@ -164,12 +169,15 @@ def lost(volume: Volume, chart: Chart, points: Array, params: StartParams) -> Bo
     return np.asarray(~held)
 
 
-def choose_chart(volume: Volume, views: Sequence[Array], params: StartParams) -> tuple[Chart, dict[Chart, float]]:
+def choose_chart(
+    volume: Volume, views: Sequence[Array], params: StartParams, around: bool = False
+) -> tuple[Chart, dict[Chart, float]]:
     """The chart that loses (nearly) the smallest share of visible points, over all and in the worst view, and the
     shares of all candidates.
 
     Args:
         views: (P, 3) points of each camera.
+        around: they see the subject from all around.
 
     Raises:
         UserError: if there are no points.
@@ -178,7 +186,7 @@ def choose_chart(volume: Volume, views: Sequence[Array], params: StartParams) ->
     if not len(points):
         raise no_subject("the middle frame")
     charts = [chart for x in params.centres for chart in _charts(x, points, params)]
-    gone = {chart: lost(volume, chart, points, params) for chart in charts}
+    gone = {chart: lost(volume, chart, points, params, around) for chart in charts}
     losses = {chart: float(one.mean()) for chart, one in gone.items()}
     tied = [c for c, loss in losses.items() if loss <= min(losses.values()) + params.centre_tie]
     worst = {c: max(float(part.mean()) for part in np.split(gone[c], ends) if len(part)) for c in tied}

@@ -10,11 +10,13 @@ import trimesh
 from numpy.typing import NDArray
 
 from facefolds_core.errors import UserError
+from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.chart import Belt, Chart
 from facefolds_core.params import ExplicitParams
 from facefolds_core.subject import outline
 from facefolds_core.subject.volume import Volume
-from facefolds_core.training.explicit.fit import fit_window, moves
+from facefolds_core.training.explicit.fit import filmed_around, fit_window, moves
+from tests.scenes import look_at_origin
 
 PARAMS = ExplicitParams()
 START = PARAMS.start.model_copy(update={"centres": (-0.15, -0.2, -0.25), "belts": (10.0,)})
@@ -110,7 +112,7 @@ def test_a_chart_that_takes_much_from_one_camera_does_not_win(monkeypatch: pytes
     volume, points = ball()
     views = np.array_split(np.tile(points, (4, 1)), 100)
 
-    def gone(volume: Volume, chart: Chart, points: Array, params: object) -> np.ndarray:
+    def gone(volume: Volume, chart: Chart, points: Array, *_: object) -> np.ndarray:
         few = np.zeros(len(points), bool)
         few[: int(0.001 * len(points)) if chart.centre[0] < -0.2 else 0] = True
         return few
@@ -147,12 +149,20 @@ def test_windows_reach_behind_the_ears_and_below_the_pole_where_something_is_see
     assert -START.azimuth_limit <= v0 < -1.2 and 1.2 < v1 <= START.azimuth_limit
     assert -0.3 < u0 < u1 < 0.3
     back = chart.points(np.array([[0.0, -1.99], [0.0, 1.99]]), np.full(2, HEAD))
-    assert fit_window(bust, chart, back, None, START)[2:] == (-2, 2)  # which is one line: the head is closed
+    assert fit_window(bust, chart, back, None, START, around=True)[2:] == (-2, 2)  # one line
 
 
-def test_a_subject_that_no_camera_sees_is_said(bust: Volume) -> None:
+def test_a_subject_beyond_every_window_is_said(bust: Volume) -> None:
+    behind = np.array([[AXIS - 0.3, 0.001, 0.0], [AXIS - 0.3, -0.001, 0.0]])
     with pytest.raises(UserError, match="has a place"):
-        fit_window(bust, Chart((AXIS, 0.0, 0.0)), np.empty((0, 3)), None, START)
+        fit_window(bust, Chart((AXIS, 0.0, 0.0)), behind, None, START)
+
+
+def test_all_around_is_what_leaves_no_wide_gap() -> None:
+    def ring(count: int) -> list[Camera]:
+        return [look_at_origin(f"c{k}", 360 / 8 * k, 0, 16) for k in range(count)]
+
+    assert filmed_around(ring(8)) and not filmed_around(ring(7)) and not filmed_around([])
 
 
 def test_the_back_of_a_tracked_head_widens_no_window(bust: Volume) -> None:

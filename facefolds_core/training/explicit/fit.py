@@ -10,9 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from facefolds_core.asset.filmed import ROUND, filmed_view
 from facefolds_core.captures.scene import Scene
 from facefolds_core.errors import UserError
 from facefolds_core.facts import Fact, fact
+from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.chart import Chart
 from facefolds_core.geometry.sphere_uv import Window
 from facefolds_core.geometry.torso import Torso
@@ -120,10 +122,11 @@ def fit_scene(scene: Scene, subject: FoundSubject, params: ExplicitParams, other
     cameras = [scene.camera_in_head(i, reference_frame(scene)) for i in scene.indices("train")]
     views = [visible_points(coarse, [camera]) for camera in cameras]
     visible = np.concatenate(views)
-    chart, losses = choose_chart(coarse, views, start)
+    around = filmed_around(cameras)
+    chart, losses = choose_chart(coarse, views, start, around)
     surface, notes = trusted_surface(scene, coarse, chart, start)
     vertices = None if surface is None else surface[0].astype(np.float64)
-    window = fit_window(coarse, chart, visible, vertices, start)
+    window = fit_window(coarse, chart, visible, vertices, start, around)
     rows, columns = grid_shape(window, geometry.nodes, LEAST_NODES)
     uv = window_uv(window, rows, columns)
     seen = profile(volume, chart, uv, start.subject_opacity)
@@ -187,14 +190,25 @@ def _reasons(params: ExplicitParams, lost: float, middle: Fact, most: float, sec
     )
 
 
-def fit_window(volume: Volume, chart: Chart, points: Array, vertices: Array | None, params: StartParams) -> Window:
+def filmed_around(cameras: Sequence[Camera]) -> bool:
+    """Whether the widest gap between their azimuths is narrow."""
+    view = filmed_view(cameras)
+    return view is not None and view.azimuth[1] - view.azimuth[0] >= ROUND
+
+
+def fit_window(
+    volume: Volume, chart: Chart, points: Array, vertices: Array | None, params: StartParams, around: bool = False
+) -> Window:
     """Box around the directions that hold the subject: the volume's near `points` that cameras see, (P, 3), and those
     of mesh vertices (K, V, 3) in front of the axis: nobody needs to see the back of a whole head.
+
+    Args:
+        around: the cameras stand all around; else it ends behind the ears and before the crown.
 
     Raises:
         UserError: if there is nothing.
     """
-    limits = whole_window(chart, params, params.window_limit)
+    limits = whole_window(chart, params, around)
     uv, least = window_uv(limits, WINDOW_NODES, WINDOW_NODES), params.subject_opacity
     last = WINDOW_NODES - 1
     highest, lowest = np.array([limits[1], limits[3]]), np.array([limits[0], limits[2]])

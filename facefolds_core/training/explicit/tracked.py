@@ -59,7 +59,7 @@ def trusted_surface(
 def share_off(volume: Volume, chart: Chart, vertices: Array, faces: NDArray[np.int32], start: StartParams) -> float:
     """Share of the directions, of those with a surface in the volume and in the mesh (K, V, 3), in which the two lie
     over MAX_DISTANCE apart; 0 where there are none. Nothing is compared behind the ears, where few cameras look."""
-    u0, u1, v0, v1 = whole_window(chart, start, start.compared_limit)
+    u0, u1, v0, v1 = whole_window(chart, start)
     uv = window_uv((max(u0, -1.0), u1, max(v0, -1.0), min(v1, 1.0)), NODES, NODES)
     least = start.subject_opacity
     seen, mesh = profile(volume, chart, uv, least), mesh_radii(vertices, faces, chart, uv)
