@@ -3,18 +3,6 @@
 const ASIDE = { azimuth: 62, elevation: 8 }; // degrees: from where layers that are pulled apart are seen
 const ACROSS = { azimuth: 28, elevation: 26 }; // the same where the canvas is tall: their row goes up the picture
 
-const SMALL = 0.1; // of the largest layer's triangles
-
-/**
- * Where layers stand in their row: small ones, of a second surface, beside the one before them.
- * @param {number[]} sizes triangles of each layer @returns {number[]} places from 0 on
- */
-export function placesOf(sizes) {
-  const least = SMALL * Math.max(...sizes);
-  let place = -1;
-  return sizes.map((size) => (size < least && place >= 0 ? place : ++place));
-}
-
 export class Apart {
   /** @param {import("./player.js").Player} player */
   constructor(player) {

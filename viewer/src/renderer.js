@@ -6,7 +6,6 @@
  * Stored values are blended as they are: no colour management, no tone mapping, no sRGB textures.
  * A pixel is the mean of SIDE x SIDE rays: the picture is drawn SIDE times as large, and averaged.
  */
-import { placesOf } from "./apart.js";
 import { Graphics, SIDE } from "./gl/graphics.js";
 import { Target } from "./gl/target.js";
 import { Upload } from "./gl/upload.js";
@@ -78,7 +77,6 @@ export class LayerRenderer {
     this.level = level;
     const ends = level.geometries.flatMap(({ box }) => [box.low[2], box.high[2]]);
     this.tall = Math.max(...ends) - Math.min(...ends);
-    this.places = placesOf(level.geometries.map(({ index }) => index.length));
     this.upload = new Upload(this.graphics.gl, level);
   }
 
@@ -146,9 +144,8 @@ export class LayerRenderer {
   }
 
   #shift(index) {
-    const middle = Math.max(...this.places) / 2;
-    const step = Math.min(SPREAD.step, SPREAD.all / (2 * middle || 1));
-    return this.spread * this.tall * step * (middle - this.places[index]);
+    const middle = (this.level.geometries.length - 1) / 2;
+    return this.spread * this.tall * Math.min(SPREAD.step, SPREAD.all / (2 * middle || 1)) * (middle - index);
   }
 
   /**

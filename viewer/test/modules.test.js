@@ -5,7 +5,6 @@ import { fitted, orbitView, positionOf, projectionOf, viewOf } from "../src/came
 import { eyeOf, transformed } from "../src/matrices.js";
 import { fieldOfView, orbitOf } from "../src/attributes.js";
 import { Adaptation } from "../src/adapt.js";
-import { placesOf } from "../src/apart.js";
 import { bounded, hemsFrom, resisted, strength, unwound } from "../src/limits.js";
 import { parseManifest } from "../src/manifest.js";
 import { Pace } from "../src/pace.js";
@@ -89,12 +88,6 @@ test("any colour survives its way through the address", () => {
 test("nonsense in the address is left out", () => {
   assert.deepEqual(decode("#view=1,2&frame=x&speed=0&background=url(x)&mode=x&level=A/B&spread=7&photo=-1"), {});
   assert.deepEqual(decode(""), {});
-});
-
-test("parts of a second surface take no place in the row of layers", () => {
-  assert.deepEqual(placesOf([900, 1000, 950, 40, 40]), [0, 1, 2, 2, 2]);
-  assert.deepEqual(placesOf([40, 1000, 900]), [0, 1, 2]);
-  assert.deepEqual(placesOf([7]), [0]);
 });
 
 test("the clock loops, stops, waits and steps", () => {
