@@ -1,4 +1,4 @@
-// Pictures of a GLB in Babylon.js, in its own left-handed axes, as its examples open one.
+// Pictures of a GLB in Babylon.js, in its own left-handed axes, as its examples open one, but with exact colours.
 import { Engine } from "@babylonjs/core/Engines/engine.js";
 import { FreeCamera } from "@babylonjs/core/Cameras/freeCamera.js";
 import { Scene } from "@babylonjs/core/scene.js";
@@ -21,6 +21,7 @@ export async function opened(file, width, height) {
   const scene = new Scene(engine);
   scene.activeCamera = new FreeCamera("camera", Vector3.Zero(), scene);
   const { meshes } = await ImportMeshAsync(file, scene);
+  for (const texture of scene.textures) texture.anisotropicFilteringLevel = 1; // the format's sampler knows of none
   return { canvas, engine, scene, meshes };
 }
 
