@@ -12,18 +12,17 @@ shares b only: a layer's point is the outer layer's, moved by sum_k b_k (rho_k -
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 
 from facefolds_core.export.stores import Grids, Sheets
 from facefolds_core.geometry.meshes import TexturedMesh
-from facefolds_core.geometry.sphere_uv import st_to_uv, texel_uv, uv_to_st
+from facefolds_core.geometry.sphere_uv import ALL_AROUND, st_to_uv, texel_uv, uv_to_st
 
 Array = NDArray[np.float64]
-
-ALL_AROUND = 4 - 1e-9
-"""v of a window that goes all around the head: 360 degrees."""
 
 
 def grid_sheets(grids: Grids, resolution: int | None) -> Sheets:
@@ -46,17 +45,24 @@ def grid_sheets(grids: Grids, resolution: int | None) -> Sheets:
     for layer, known in enumerate(valid):
         nearest = distance_transform_edt(~known, return_distances=False, return_indices=True)
         radii[layer] = radii[layer][tuple(nearest)]
+    window = grids.window(0)
+    st = uv_to_st(texel_uv(grids.resolution, grids.resolution, window), window)[thin[1:]]
+    if goes_around(window):
+        # Both borders are one line: they meet there, where one alone knows a radius at that one.
+        st[:, 0, 0], st[:, -1, 0] = 0, 1
+        ends = valid[:, :, [0, -1]]
+        weights = np.where(ends.any(-1, keepdims=True), ends, True)
+        radii[:, :, [0, -1]] = ((radii[:, :, [0, -1]] * weights).sum(-1) / weights.sum(-1))[..., None]
     radii = np.minimum.accumulate(radii, 0)
     falling = np.abs(radii[:, :-1, :-1] - radii[:, 1:, 1:]).sum(0) <= np.abs(radii[:, :-1, 1:] - radii[:, 1:, :-1]).sum(
         0
     )
-    window = grids.window(0)
-    st = uv_to_st(texel_uv(grids.resolution, grids.resolution, window), window)[thin[1:]]
-    if window[3] - window[2] >= ALL_AROUND:
-        # Both borders are one line: they meet there.
-        st[:, 0, 0], st[:, -1, 0] = 0, 1
-        radii[:, :, 0] = radii[:, :, -1] = (radii[:, :, 0] + radii[:, :, -1]) / 2
     return Sheets(st, radii.astype(np.float32), valid, grids.opacity[thin], falling, grids.windows[0], grids.chart)
+
+
+def goes_around(window: Sequence[float] | Array) -> bool:
+    """Whether a window (u0, u1, v0, v1) closes behind the head."""
+    return bool(window[3] - window[2] >= ALL_AROUND)
 
 
 def vertex_uv(sheets: Sheets) -> Array:

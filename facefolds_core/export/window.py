@@ -18,7 +18,7 @@ import torch
 from numpy.typing import NDArray
 
 from facefolds_core.geometry.cameras import Camera
-from facefolds_core.geometry.sphere_uv import Window
+from facefolds_core.geometry.sphere_uv import Window, closed
 from facefolds_core.spacing import spread
 
 if TYPE_CHECKING:
@@ -59,7 +59,7 @@ def visible_window(model: RadianceManifolds, cameras: Sequence[Camera]) -> Windo
         return model.window
     least, most = np.array(model.window).reshape(2, 2).T
     (u0, v0), (u1, v1) = np.maximum(low - margin, least), np.minimum(high + margin, most)
-    return float(u0), float(u1), float(v0), float(v1)
+    return closed((float(u0), float(u1), float(v0), float(v1)))
 
 
 def _seen_uv(

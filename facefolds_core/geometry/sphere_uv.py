@@ -60,6 +60,18 @@ def points_to_uv(points: Any, centre: Any) -> tuple[Any, Any]:
     return directions_to_uv(offset / safe[..., None]), radius
 
 
+ALL_AROUND = 4.0
+"""v of a window that goes all around: 360 degrees."""
+GAP = 0.15
+"""A window that lacks less of it, 13 degrees, goes all around."""
+
+
+def closed(window: Window) -> Window:
+    """A window with a narrow gap behind made to go all around; others as they are."""
+    u0, u1, v0, v1 = window
+    return (u0, u1, -ALL_AROUND / 2, ALL_AROUND / 2) if v1 - v0 >= ALL_AROUND - GAP else window
+
+
 def uv_to_st(uv: Any, window: Window = FULL_WINDOW) -> Any:
     """(u, v) (..., 2) -> (s, t) (..., 2): s right, t down, [0, 1] over the window's image."""
     lib = library_of(uv)

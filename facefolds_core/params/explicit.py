@@ -40,8 +40,8 @@ class StartParams(Section):
     """Largest |v| of a window; 1 is straight sideways from c."""
 
     around_limits: ClassVar[tuple[float, float]] = (0.995, 2.0)
-    """The same, |u| and |v|, of a subject that was filmed all around: it is closed behind, and above but for half a
-    degree, a millimetre of a crown."""
+    """The same, |u| and |v|, of a subject that was filmed all around: it is closed behind, and at the poles but for
+    half a degree, a millimetre of a crown."""
 
     subject_opacity: ClassVar[float] = 0.5
     """Opacity of the subject's Gaussians from which on a direction holds the subject."""

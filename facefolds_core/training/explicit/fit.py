@@ -16,7 +16,7 @@ from facefolds_core.errors import UserError
 from facefolds_core.facts import Fact, fact
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.chart import Chart
-from facefolds_core.geometry.sphere_uv import Window
+from facefolds_core.geometry.sphere_uv import Window, closed
 from facefolds_core.geometry.torso import Torso
 from facefolds_core.params import ExplicitParams, GeometryParams, StartParams
 from facefolds_core.rendering.compositing import transmittance_before
@@ -191,7 +191,7 @@ def _reasons(params: ExplicitParams, lost: float, middle: Fact, most: float, sec
 
 
 def filmed_around(cameras: Sequence[Camera]) -> bool:
-    """Whether the widest gap between their azimuths is narrow."""
+    """Whether the widest gap between their azimuths is 60 degrees (`ROUND`) at most."""
     view = filmed_view(cameras)
     return view is not None and view.azimuth[1] - view.azimuth[0] >= ROUND
 
@@ -200,7 +200,7 @@ def fit_window(
     volume: Volume, chart: Chart, points: Array, vertices: Array | None, params: StartParams, around: bool = False
 ) -> Window:
     """Box around the directions that hold the subject: the volume's near `points` that cameras see, (P, 3), and those
-    of mesh vertices (K, V, 3) in front of the axis: nobody needs to see the back of a whole head.
+    of mesh vertices (K, V, 3) in front of the axis: a mesh has a back that nobody may have filmed.
 
     Args:
         around: the cameras stand all around; else it ends behind the ears and before the crown.
@@ -231,7 +231,7 @@ def fit_window(
             remedy="check `front` and `centre` of the subject (`facefolds doctor`), or add to train.start.centres",
         )
     low, high = np.maximum(places.min(0) - margin, lowest), np.minimum(places.max(0) + margin, highest)
-    return float(low[0]), float(high[0]), float(low[1]), float(high[1])
+    return closed((float(low[0]), float(high[0]), float(low[1]), float(high[1])))
 
 
 def greatest_halfwidth(params: GeometryParams, pixel: float) -> float:

@@ -38,7 +38,7 @@ OPACITY = 0.9
 
 
 def some_frames(vertices: Array) -> Array:
-    """Of vertices (K, V, 3), `MESH_FRAMES` to twice as many, evenly spread."""
+    """Of vertices (K, V, 3), `MESH_FRAMES` to twice as many, evenly spread; all of fewer."""
     return vertices[:: max(1, len(vertices) // MESH_FRAMES)]
 
 
