@@ -12,8 +12,6 @@ shares b only: a layer's point is the outer layer's, moved by sum_k b_k (rho_k -
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
@@ -47,7 +45,7 @@ def grid_sheets(grids: Grids, resolution: int | None) -> Sheets:
         radii[layer] = radii[layer][tuple(nearest)]
     window = grids.window(0)
     st = uv_to_st(texel_uv(grids.resolution, grids.resolution, window), window)[thin[1:]]
-    if goes_around(window):
+    if window[3] - window[2] >= ALL_AROUND:
         # Both borders are one line: they meet there, where one alone knows a radius at that one.
         st[:, 0, 0], st[:, -1, 0] = 0, 1
         ends = valid[:, :, [0, -1]]
@@ -58,11 +56,6 @@ def grid_sheets(grids: Grids, resolution: int | None) -> Sheets:
         0
     )
     return Sheets(st, radii.astype(np.float32), valid, grids.opacity[thin], falling, grids.windows[0], grids.chart)
-
-
-def goes_around(window: Sequence[float] | Array) -> bool:
-    """Whether a window (u0, u1, v0, v1) closes behind the head."""
-    return bool(window[3] - window[2] >= ALL_AROUND)
 
 
 def vertex_uv(sheets: Sheets) -> Array:

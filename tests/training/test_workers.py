@@ -12,6 +12,7 @@ import pytest
 
 from facefolds_core.captures.scene import Scene
 from facefolds_core.errors import UserError
+from facefolds_core.files.writing import read_json
 from facefolds_core.training.segments import workers
 from facefolds_core.training.segments.base import Base
 from facefolds_core.training.segments.forecast import forecast, processes_for
@@ -56,6 +57,9 @@ def files(folder: Path) -> dict[str, bytes]:
         for path in sorted((folder / part).rglob("*"))
         if path.is_file() and path.name not in ("training.json", "params.json")
     }
+    ran = read_json(folder / "model" / "params.json")
+    del ran["segments"]["processes"]
+    found["model/params.json"] = repr(ran).encode()
     assert {"model/segments/00002.safetensors", "log/plots/metrics/segment_psnr.tsv"} <= found.keys()
     return found
 
