@@ -22,12 +22,14 @@ VIEWS = 16
 """Virtual cameras, at most."""
 FEW = 12
 """They are asked for places that fewer cameras see: what more cameras see, photos say better than Gaussians do."""
+NEIGHBOURS = 0.5
+"""Least cosine between cameras with a view halfway between them: farther apart, it lies above or below all others."""
 HIDDEN = 0.01
 """What lies so far behind the subject's surface, units, a camera does not see."""
 DIRECTIONS = 3000
 """Places that are tried, evenly on the sphere: 4 degrees apart."""
-SLOPE = 0.2
-"""Least cosine of the angle between a place and the cameras' mean direction."""
+ALL_AROUND = 0.2
+"""Length of the mean of the cameras' directions under which they stand all around: those of a half circle have 0.64."""
 SMALLEST = 0.01
 """Least radius that a subject is taken to have, units."""
 SOLID = 0.5
@@ -101,7 +103,7 @@ def _places(real: Array) -> list[Array]:
     if len(real) < 3:
         return []
     tried = _sphere(DIRECTIONS)
-    wanted = tried[_between(tried, real)]
+    wanted = np.concatenate([tried[_between(tried, real)], _halfway(real)])
     nearest = (wanted @ real.T).max(1, initial=-1)
     chosen: list[Array] = []
     while len(chosen) < min(VIEWS, len(wanted)):
@@ -115,15 +117,30 @@ def _places(real: Array) -> list[Array]:
 
 def _between(tried: Array, real: Array) -> NDArray[np.bool_]:
     """(n,) which of the directions (n, 3) lie within the convex hull of the real ones (C, 3), seen from the subject:
-    what Gaussians show beyond it was seen by nobody. The hull is that of their central projection."""
-    mean = real.mean(0) / max(float(np.linalg.norm(real.mean(0))), 1e-9)
-    across = np.linalg.svd(mean[None])[2][1:]
-    before, ahead = real @ mean, tried @ mean
-    if before.min() < SLOPE:  # all around
-        return np.asarray(ahead >= SLOPE)
-    hull = Delaunay((real @ across.T) / before[:, None], qhull_options="QJ")
-    places = (tried @ across.T) / np.maximum(ahead, SLOPE)[:, None]
-    return np.asarray((ahead >= SLOPE) & (hull.find_simplex(places) >= 0))
+    what Gaussians show beyond it was seen by nobody. The hull is that of a map that keeps angles to their mean
+    direction; cameras all around have none, and its place is taken by what lies between the lowest and the highest."""
+    mean = real.mean(0)
+    if np.linalg.norm(mean) < ALL_AROUND:
+        return np.asarray((tried[:, 2] >= real[:, 2].min()) & (tried[:, 2] <= real[:, 2].max()))
+    hull = Delaunay(_map(real, mean), qhull_options="QJ")
+    return np.asarray(hull.find_simplex(_map(tried, mean)) >= 0)
+
+
+def _halfway(real: Array) -> Array:
+    """(n, 3) directions in the middle between two real ones: cameras in a row have nothing else between them."""
+    first, second = np.triu_indices(len(real), 1)
+    near = (real[first] * real[second]).sum(1) > NEIGHBOURS
+    middle = (real[first] + real[second])[near]
+    return np.asarray(middle / np.linalg.norm(middle, axis=1, keepdims=True))
+
+
+def _map(directions: Array, mean: Array) -> Array:
+    """(n, 2) azimuthal equidistant map of unit vectors (n, 3) about a mean direction, radians."""
+    axis = mean / np.linalg.norm(mean)
+    across = directions @ np.linalg.svd(axis[None])[2][1:].T
+    length = np.linalg.norm(across, axis=1, keepdims=True)
+    angles = np.arctan2(length, (directions @ axis)[:, None])
+    return np.asarray(angles * across / np.maximum(length, 1e-9))
 
 
 def _sphere(count: int) -> Array:
