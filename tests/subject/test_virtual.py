@@ -54,7 +54,7 @@ def test_cameras_beside_the_subject_have_no_views_above_or_below_all_of_them() -
     found = directions(virtual_cameras(real, SUBJECT, (48, 48)))
     elevations, azimuths = np.degrees(np.arcsin(found[:, 2])), np.degrees(np.arctan2(found[:, 1], found[:, 0]))
     assert len(found) > 8
-    assert np.abs(elevations).max() < 31  # a great circle between two cameras rises above them
+    assert np.abs(elevations).max() < 36  # the hull of the map rises above them
     assert np.abs(azimuths).max() < 82
 
 
