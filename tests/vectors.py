@@ -1,18 +1,21 @@
 """Conformance vectors: tiny assets, cameras and the pictures that a player must show; and how near somebody's come.
 
 `python -m tests.vectors FOLDER`, then `... FOLDER --check PICTURES` (docs/reference/asset-format.md).
+`python -m tests.vectors docs/reference/EXT_layered_volumetric_video/examples --example` writes what is kept.
 
-Made, not kept: the same on every machine, but for what float32 rounds. They have what players get wrong: sheets that
-fold before the eye (only the nearest crossing counts), half-transparent layers, texels unlike their neighbours, pixels
-that hold several texels, rectangles anywhere in the picture, two levels, a head that moves, a frame rate that is no
-whole number, and the same take once more as a stream in segments.
+Made, not kept, but for the extension's example: the same on every machine, but for what float32 rounds. They have what
+players get wrong: sheets that fold before the eye (only the nearest crossing counts), half-transparent layers, texels
+unlike their neighbours, pixels that hold several texels, rectangles anywhere in the picture, two levels, a head that
+moves, a frame rate that is no whole number, and the same take once more as a stream in segments.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import shutil
 import sys
+import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -53,6 +56,7 @@ WINDOW: Window = (-0.5, 0.5, -0.45, 0.45)
 LAYERS, FRAMES, TEXELS, SIDE = 3, 6, 64, 128
 RATE = 30000 / 1001
 BACKGROUND = (64 / 255, 128 / 255, 192 / 255)
+SHOWN_OVER = "#4080c0"
 LEAST = 40.0
 """dB that a player should reach. 8 bits after each layer's blending leave 50 and more, chroma placed otherwise 40."""
 
@@ -138,8 +142,25 @@ def write_vectors(folder: Path) -> int:
             for filtered in RENDERERS:
                 picture = _picture(read_asset(out / view["asset"]), view, filtered)
                 Image.fromarray(picture).save(out / filtered / view["file"])
-        write_json(out / VIEWS, {"background": "#4080c0", "views": views})
+        write_json(out / VIEWS, {"background": SHOWN_OVER, "views": views})
     return len(views)
+
+
+def write_example(folder: Path) -> int:
+    """Write `EXAMPLE`, its views and their pictures, whole or not at all; returns how many views."""
+    with tempfile.TemporaryDirectory() as made, atomic_folder(folder) as out:
+        write_vectors(Path(made) / "vectors")
+        source = Path(made) / "vectors"
+        views = [view for view in json.loads((source / VIEWS).read_text())["views"] if shown_by_example(view)]
+        for name in (EXAMPLE, *(f"{REFERENCE}/{view['file']}" for view in views)):
+            shutil.copy(source / name, out)
+        write_json(out / VIEWS, {"background": SHOWN_OVER, "views": views})
+    return len(views)
+
+
+def shown_by_example(view: dict[str, Any]) -> bool:
+    """Whether a view of `views.json` is one of `EXAMPLE`."""
+    return (view["asset"], view["level"]) == ("short", FULL)
 
 
 def _content() -> LevelContent:
@@ -219,7 +240,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("folder", type=Path, help="where the vectors are, or are to be")
     parser.add_argument("--check", type=Path, help="folder of a player's pictures, named as in views.json")
+    parser.add_argument("--example", action="store_true", help="write the extension's example alone")
     given = parser.parse_args()
+    if given.example:
+        print(f"{write_example(given.folder)} pictures of {given.folder / EXAMPLE}")
+        return
     if given.check is None:
         print(f"{write_vectors(given.folder)} pictures of two assets in {given.folder}")
         return

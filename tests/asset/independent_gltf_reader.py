@@ -96,7 +96,7 @@ class Face:
         matrix = np.linalg.inv(placed(self._pose(frame))) @ placed(one)
         return x + share * (x @ matrix[:3, :3].T + matrix[:3, 3] - x)
 
-    def render(self, eye: Array, rays: Array, frame: int, background: float, picture: Array) -> Array:
+    def render(self, eye: Array, rays: Array, frame: int, background: float | Array, picture: Array) -> Array:
         """Colors (M, 3) along unit rays (M, 3) from an eye, both in the scene's axes, of one of `pictures`."""
         inward = np.linalg.inv(self.to_gltf(frame))
         eye, rays = inward[:3, :3] @ eye + inward[:3, 3], rays @ inward[:3, :3].T

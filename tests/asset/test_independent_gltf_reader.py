@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
+import json
+from pathlib import Path
+
 import numpy as np
 import pytest
+from PIL import Image
 
 from facefolds_core.asset import Asset
+from facefolds_core.asset.gltf.checking import check_glb
 from facefolds_core.asset.gltf.writing import write_layered
 from facefolds_core.rendering.pixels import render
 from tests.asset.independent_gltf_reader import Face
 from tests.assets import MOVING, OVER_TORSO
 from tests.pictures import GREY_VALUE, five_cameras, psnr
+from tests.vectors import BACKGROUND, EXAMPLE, VIEWS, shown_by_example
 from tests.viewer.fixtures import moving_asset
 
 pytestmark = pytest.mark.slow
 
+KEPT = Path(__file__).parents[2] / "docs/reference/EXT_layered_volumetric_video/examples"
 SIZE, FRAME = 24, 2
 AGREE = 45.0
 """dB, of means over pixels."""
@@ -40,3 +47,27 @@ def test_five_views_agree_with_the_reference(asset: Asset) -> None:
         found = face.render((-R.T @ t)[[1, 2, 0]], rays[:, [1, 2, 0]], FRAME, GREY_VALUE, picture)
         expected, _ = render(asset, camera, FRAME, (GREY_VALUE,) * 3)
         assert psnr(found.reshape(SIZE, 2, SIZE, 2, 3).mean((1, 3)), expected) >= AGREE, camera.name
+
+
+def test_the_example_that_is_kept_shows_what_its_pictures_show(vectors: Path) -> None:
+    """As the vectors of today, and as the reader sees it: every third pixel, each by its quarters."""
+    views = json.loads((KEPT / VIEWS).read_text())["views"]
+    made = [view for view in json.loads((vectors / VIEWS).read_text())["views"] if shown_by_example(view)]
+    assert [view["file"] for view in views] == [view["file"] for view in made]
+    for key in ("K", "w2c"):
+        np.testing.assert_allclose([view[key] for view in views], [view[key] for view in made], atol=1e-9)
+    assert check_glb(KEPT / EXAMPLE) == []
+    face = Face((KEPT / EXAMPLE).read_bytes())
+    pictures = face.pictures()
+    for view in views:
+        places = np.arange(1, view["width"], 3)
+        pixels = np.stack(np.meshgrid(places, places), -1).reshape(-1, 1, 2)
+        quarters = pixels + np.stack(np.meshgrid((0.25, 0.75), (0.25, 0.75)), -1).reshape(1, -1, 2)
+        R, t = np.array(view["w2c"])[:, :3], np.array(view["w2c"])[:, 3]
+        rays = np.concatenate([quarters, np.ones((*quarters.shape[:2], 1))], -1).reshape(-1, 3)
+        rays = rays @ np.linalg.inv(np.array(view["K"])).T @ R
+        rays /= np.linalg.norm(rays, axis=1, keepdims=True)
+        eye, frame = (-R.T @ t)[[1, 2, 0]], view["frame"]
+        found = face.render(eye, rays[:, [1, 2, 0]], frame, np.array(BACKGROUND), pictures[frame])
+        truth = np.asarray(Image.open(KEPT / view["file"]), float)[pixels[:, 0, 1], pixels[:, 0, 0]] / 255
+        assert psnr(found.reshape(len(pixels), 4, 3).mean(1), truth) >= AGREE, view["file"]
