@@ -2,6 +2,8 @@
 
 The mesh is what the pipeline makes with one layer. Splats are fitted to the same cut-outs, as many as our full level's
 bytes hold: all for one still, or shared out among the frames, each fitted by itself. Held-out cameras, true opacity.
+
+With `--page` a page instead, .equal_bytes/page: ours, the mesh and the still splats live, turned together.
 """
 
 from __future__ import annotations
@@ -17,6 +19,7 @@ import typer
 from numpy.typing import NDArray
 from PIL import Image
 
+from bench.players import build_pages
 from bench.results import ROOT
 from bench.run import Project, own_params
 from bench.tables import markdown
@@ -25,6 +28,7 @@ from facefolds_core.captures.cutout import cut_from
 from facefolds_core.captures.found_scene import found_scene
 from facefolds_core.captures.scene import Scene
 from facefolds_core.files.paths import SubjectFolders
+from facefolds_core.files.writing import write_json
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.rendering.camera_paths import Eye, camera_of, turntable
 from facefolds_core.rendering.pixels import render
@@ -35,7 +39,9 @@ from facefolds_core.scoring.truths import Truths
 from facefolds_core.spacing import spread
 from facefolds_core.subject import drawing
 from facefolds_core.subject.fit import fit_pictures
+from facefolds_core.subject.found import reference_frame
 from facefolds_core.subject.gaussians import GaussianMethod
+from facefolds_core.subject.ply import write_ply
 from facefolds_core.subject.splats import Splats
 
 SPLAT_BYTES = 20
@@ -44,6 +50,18 @@ FRAMES = 3
 """That are scored, evenly spread."""
 PICTURES, SIZE, FIELD_OF_VIEW = 48, (200, 260), 18.5
 """Of the film, a turntable about the actor's middle in which all frames play; pixels of a pane; degrees."""
+PAGE = """<!doctype html><meta charset="utf-8"><title>At equal bytes</title><link rel="icon" href="data:,">
+<style>
+body { margin: 0; font: 16px/1.4 system-ui, sans-serif; background: #808080; color: #fff }
+main { display: grid; grid-template-columns: repeat(auto-fit, minmax(260px, 1fr)) }
+figure { margin: 0; text-align: center }
+figure > :first-child { display: block; width: 100%; aspect-ratio: 4 / 5 }
+label { display: block; text-align: center; padding: 1rem }
+input { width: min(24rem, 80%); vertical-align: middle }
+</style>
+<body><main></main><label>Turn <input type="range" min="-70" max="70" value="20"></label>
+<script type="module" src="/beside.js"></script></body>
+"""
 STAGES = ("configure", "train", "sample", "reconstruct", "decimate", "texture", "bake", "compress")
 Array = NDArray[np.float64]
 Look = Callable[[Camera, int], tuple[Array, Array]]
@@ -116,14 +134,41 @@ def film(looks: Sequence[Look], num_frames: int, count: int, size: tuple[int, in
     return pictures
 
 
+def write_page(page: Path, ours: Asset, mesh: Asset, splats: Splats) -> None:
+    """A folder for any static server: the players, what they show, and `beside.json`, which says it."""
+    shutil.rmtree(page, ignore_errors=True)
+    page.mkdir(parents=True)
+    build_pages(page)
+    for name, asset in (("ours", ours), ("mesh", mesh)):
+        shutil.copytree(asset.folder, page / name)
+    write_ply(page / "splats.ply", splats)
+    panes = [
+        {"kind": "player", "name": "ours", "file": "ours/", "bytes": ours.full.entry.bytes},
+        {"kind": "player", "name": "one mesh with a video", "file": "mesh/", "bytes": mesh.full.entry.bytes},
+        {
+            "kind": "splats",
+            "name": f"{len(splats):,} splats, a still, as SPZ",
+            "file": "splats.ply",
+            "bytes": SPLAT_BYTES * len(splats),
+        },
+    ]
+    write_json(page / "beside.json", {"panes": panes, "target": [-0.1, 0.0, -0.035], "degrees": 20})
+    (page / "index.html").write_text(PAGE, encoding="utf-8")
+
+
 def main(
     subject: Annotated[Path, typer.Argument(help="Folder of the subject, e.g. data/actor: all stages have run.")],
-    out: Annotated[Path, typer.Argument(help="Folder for the mesh's run.")],
+    out: Annotated[Path, typer.Argument(help="Folder for the mesh's run, and for the page.")],
+    page: Annotated[bool, typer.Option("--page", help="Make the page; no table and no film.")] = False,
 ) -> None:
     """Print the table, and film docs/images/equal_bytes.webp."""
     folders = SubjectFolders(subject)
     scene, ours, mesh = found_scene(folders), read_asset(folders.asset), one_layer(folders, out)
     every, size = list(range(scene.num_frames)), ours.full.entry.bytes
+    if page:
+        write_page(out / "page", ours, mesh, splats_of(scene, reference_frame(scene), size // SPLAT_BYTES))
+        typer.echo(f"python -m http.server 8000 --directory {out / 'page'}")
+        return
     frames = spread(every, FRAMES)
     still, each = size // SPLAT_BYTES, size // SPLAT_BYTES // scene.num_frames
     rows: dict[str, tuple[int, Look, list[int]]] = {

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-MOST = 3203
+MOST = 3247
 """Lines of Python. The aim is 2200: lower it with them, never raise it but for a new command that an issue asks for:
-`gate`, 220 lines, which took over from `rooms`, `large`, 88 (2400 before them), `start`, 134, `equal_bytes`, 146,
+`gate`, 220 lines, which took over from `rooms`, `large`, 88 (2400 before them), `start`, 134, `equal_bytes`, 146 (190 with its page),
 `worth`, 230, when `decode`, 54, went, and `gpu`, 65."""
 
 
