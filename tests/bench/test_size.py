@@ -6,7 +6,7 @@ from pathlib import Path
 
 MOST = 3247
 """Lines of Python. The aim is 2200: lower it with them, never raise it but for a new command that an issue asks for:
-`gate`, 220 lines, which took over from `rooms`, `large`, 88 (2400 before them), `start`, 134, `equal_bytes`, 146 (190 with its page),
+`gate`, 220 lines, which took over from `rooms`, `large`, 88 (2400 before them), `start`, 134, `equal_bytes`, 191,
 `worth`, 230, when `decode`, 54, went, and `gpu`, 65."""
 
 

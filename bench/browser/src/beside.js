@@ -22,27 +22,56 @@ function player(figure, { file }) {
   element.setAttribute("autoplay", "");
   element.setAttribute("field-of-view", `${degrees}deg`);
   element.setAttribute("background", "#808080");
-  element.addEventListener("load", () => (element.level = element.levels.at(-1))); // the bytes that are counted
+  element.addEventListener(
+    "load",
+    () => (element.level = element.levels.at(-1)),
+  ); // the bytes that are counted
   figure.append(element);
-  shows.push((azimuth) => element.player?.view.set({ azimuth, elevation: 0, distance, target }));
-  return new Promise((done) => element.addEventListener("ready", done, { once: true }));
+  shows.push((azimuth) =>
+    element.player?.view.set({ azimuth, elevation: 0, distance, target }),
+  );
+  return new Promise((done) =>
+    element.addEventListener("ready", done, { once: true }),
+  );
 }
 
 async function splats(figure, { file }) {
   const canvas = document.createElement("div");
   figure.append(canvas);
-  const renderer = new THREE.WebGLRenderer({ antialias: false, preserveDrawingBuffer: true });
+  const renderer = new THREE.WebGLRenderer({
+    antialias: false,
+    preserveDrawingBuffer: true,
+  });
   renderer.setClearColor(0x808080);
   renderer.setSize(canvas.clientWidth, canvas.clientHeight);
   canvas.append(renderer.domElement);
-  const camera = new THREE.PerspectiveCamera(degrees, canvas.clientWidth / canvas.clientHeight, 0.01, 10);
+  const camera = new THREE.PerspectiveCamera(
+    degrees,
+    canvas.clientWidth / canvas.clientHeight,
+    0.01,
+    10,
+  );
   camera.up.set(0, 0, 1);
   const viewer = new SPLATS.Viewer({
-    ...{ renderer, camera, selfDrivenMode: false, useBuiltInControls: false, ignoreDevicePixelRatio: true },
-    ...{ sharedMemoryForWorkers: false, gpuAcceleratedSort: false, sphericalHarmonicsDegree: 1 },
+    ...{
+      renderer,
+      camera,
+      selfDrivenMode: false,
+      useBuiltInControls: false,
+      ignoreDevicePixelRatio: true,
+    },
+    ...{
+      sharedMemoryForWorkers: false,
+      gpuAcceleratedSort: false,
+      sphericalHarmonicsDegree: 1,
+    },
     sceneRevealMode: SPLATS.SceneRevealMode.Instant,
   });
-  await viewer.addSplatScene(file, { showLoadingUI: false, progressiveLoad: false, splatAlphaRemovalThreshold: 1 });
+  await viewer.addSplatScene(file, {
+    showLoadingUI: false,
+    progressiveLoad: false,
+    splatAlphaRemovalThreshold: 1,
+  });
   let left = SETTLE;
   const draw = () => {
     if (left > 0) {
@@ -54,7 +83,11 @@ async function splats(figure, { file }) {
   };
   shows.push((azimuth) => {
     const a = (azimuth * Math.PI) / 180;
-    camera.position.set(target[0] + distance * Math.cos(a), target[1] + distance * Math.sin(a), target[2]);
+    camera.position.set(
+      target[0] + distance * Math.cos(a),
+      target[1] + distance * Math.sin(a),
+      target[2],
+    );
     camera.lookAt(...target);
     camera.updateMatrixWorld();
     left = SETTLE;
@@ -69,7 +102,8 @@ await Promise.all(
   panes.map((pane) => {
     const figure = document.createElement("figure");
     main.append(figure);
-    const shown = pane.kind === "splats" ? splats(figure, pane) : player(figure, pane);
+    const shown =
+      pane.kind === "splats" ? splats(figure, pane) : player(figure, pane);
     caption(figure, pane);
     return shown;
   }),
