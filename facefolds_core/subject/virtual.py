@@ -22,6 +22,16 @@ VIEWS = 16
 """Virtual cameras, at most."""
 FEW = 12
 """They are asked for places that fewer cameras see: what more cameras see, photos say better than Gaussians do."""
+ABOVE = math.radians(10)
+"""Of cameras farther than 90 degrees to both sides the hull reaches over the head."""
+NEIGHBOURS = 0.5
+"""Least cosine between cameras with a view halfway between them: farther apart, it lies above or below all others."""
+HIDDEN = 0.01
+"""What lies so far behind the subject's surface, units, a camera does not see."""
+DIRECTIONS = 3000
+"""Places that are tried, evenly on the sphere: 4 degrees apart."""
+ABOVE = math.radians(10)
+"""Of cameras farther than 90 degrees to both sides the hull reaches over the head."""
 NEIGHBOURS = 0.5
 """Least cosine between cameras with a view halfway between them: farther apart, it lies above or below all others."""
 HIDDEN = 0.01
@@ -118,12 +128,11 @@ def _places(real: Array) -> list[Array]:
 def _between(tried: Array, real: Array) -> NDArray[np.bool_]:
     """(n,) which of the directions (n, 3) lie within the convex hull of the real ones (C, 3), seen from the subject:
     what Gaussians show beyond it was seen by nobody. The hull is that of a map that keeps angles to their mean
-    direction; cameras all around have none, and its place is taken by what lies between the lowest and the highest."""
-    mean = real.mean(0)
-    if np.linalg.norm(mean) < ALL_AROUND:
-        return np.asarray((tried[:, 2] >= real[:, 2].min()) & (tried[:, 2] <= real[:, 2].max()))
+    direction. None lies far above the highest or below the lowest."""
+    mean, heights, own = real.mean(0), np.arcsin(real[:, 2]), np.arcsin(tried[:, 2])
+    level = (own >= heights.min() - ABOVE) & (own <= heights.max() + ABOVE)
     hull = Delaunay(_map(real, mean), qhull_options="QJ")
-    return np.asarray(hull.find_simplex(_map(tried, mean)) >= 0)
+    return np.asarray(level & (hull.find_simplex(_map(tried, mean)) >= 0))
 
 
 def _halfway(real: Array) -> Array:
@@ -136,7 +145,7 @@ def _halfway(real: Array) -> Array:
 
 def _map(directions: Array, mean: Array) -> Array:
     """(n, 2) azimuthal equidistant map of unit vectors (n, 3) about a mean direction, radians."""
-    axis = mean / np.linalg.norm(mean)
+    axis = mean / max(float(np.linalg.norm(mean)), 1e-9)  # about any, where cameras stand evenly all around
     across = directions @ np.linalg.svd(axis[None])[2][1:].T
     length = np.linalg.norm(across, axis=1, keepdims=True)
     angles = np.arctan2(length, (directions @ axis)[:, None])

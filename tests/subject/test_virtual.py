@@ -48,14 +48,16 @@ def test_wide_gaps_are_filled_and_nothing_beyond_the_cameras() -> None:
     assert degrees(between, np.concatenate([directions(real), directions(found)])).min() < GAP
 
 
-def test_cameras_beside_the_subject_have_no_views_above_or_below_all_of_them() -> None:
-    """80 degrees from the middle one, where a central projection has no hull."""
-    real = [look_at_origin(f"c{a}{e}", a, e, 48) for a in (-80, -40, 0, 40, 80) for e in (-25, 25)]
+@pytest.mark.parametrize("farthest", [80, 130])
+def test_cameras_beside_the_subject_have_no_views_above_or_below_all_of_them(farthest: int) -> None:
+    """So far from the middle one a central projection has no hull, and that of angles reaches over the head."""
+    azimuths = np.linspace(-farthest, farthest, 7)
+    real = [look_at_origin(f"c{a:.0f}{e}", a, e, 48) for a in azimuths for e in (-25, 25)]
     found = directions(virtual_cameras(real, SUBJECT, (48, 48)))
     elevations, azimuths = np.degrees(np.arcsin(found[:, 2])), np.degrees(np.arctan2(found[:, 1], found[:, 0]))
     assert len(found) > 8
-    assert np.abs(elevations).max() < 36  # the hull of the map rises above them
-    assert np.abs(azimuths).max() < 82
+    assert np.abs(elevations).max() < 36
+    assert np.abs(azimuths).max() < farthest + 2
 
 
 @pytest.mark.parametrize("azimuths", [(-60, -20, 20, 60), tuple(range(0, 360, 45))], ids=["in a row", "all around"])
@@ -63,8 +65,8 @@ def test_cameras_at_one_height_have_views_between_neighbours(azimuths: tuple[int
     real = [look_at_origin(f"c{a}", a, 0, 48) for a in azimuths]
     found = directions(virtual_cameras(real, SUBJECT, (48, 48)))
     halfway = directions([look_at_origin("", a + 0.5 * (azimuths[1] - azimuths[0]), 0, 48) for a in azimuths[:-1]])
-    assert degrees(halfway, found).min(1).max() < 6
-    assert np.abs(np.degrees(np.arcsin(found[:, 2]))).max() < 6
+    assert degrees(halfway, found).min(1).max() < 10  # the subject's middle is not quite the origin
+    assert np.abs(np.degrees(np.arcsin(found[:, 2]))).max() < 11
 
 
 def test_where_there_are_no_gaps_or_too_few_cameras_to_stand_between_there_is_none() -> None:
