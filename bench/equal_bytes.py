@@ -28,7 +28,7 @@ from facefolds_core.captures.cutout import cut_from
 from facefolds_core.captures.found_scene import found_scene
 from facefolds_core.captures.scene import Scene
 from facefolds_core.files.paths import SubjectFolders
-from facefolds_core.files.writing import write_json
+from facefolds_core.files.writing import atomic_folder, write_json
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.rendering.camera_paths import Eye, camera_of, turntable
 from facefolds_core.rendering.pixels import render
@@ -50,6 +50,8 @@ FRAMES = 3
 """That are scored, evenly spread."""
 PICTURES, SIZE, FIELD_OF_VIEW = 48, (200, 260), 18.5
 """Of the film, a turntable about the actor's middle in which all frames play; pixels of a pane; degrees."""
+TARGET = (-0.1, 0.0, -0.035)
+"""That middle, units."""
 PAGE = """<!doctype html><meta charset="utf-8"><title>At equal bytes</title><link rel="icon" href="data:,">
 <style>
 body { margin: 0; font: 16px/1.4 system-ui, sans-serif; background: #808080; color: #fff }
@@ -125,7 +127,7 @@ def scores(look: Look, scene: Scene, truth: dict[tuple[int, int], Cutout]) -> li
 def film(looks: Sequence[Look], num_frames: int, count: int, size: tuple[int, int]) -> list[Image.Image]:
     """So many pictures: all of them side by side over grey, turning, while the frames play."""
     pictures = []
-    for i, eye in enumerate(turntable(Eye(target=(-0.1, 0.0, -0.035)), count, (40, 40))):
+    for i, eye in enumerate(turntable(Eye(target=TARGET), count, (40, 40))):
         camera, shots = camera_of(eye, *size, FIELD_OF_VIEW), []
         for look in looks:
             rgb, alpha = look(camera, i % num_frames)
@@ -136,24 +138,19 @@ def film(looks: Sequence[Look], num_frames: int, count: int, size: tuple[int, in
 
 def write_page(page: Path, ours: Asset, mesh: Asset, splats: Splats) -> None:
     """A folder for any static server: the players, what they show, and `beside.json`, which says it."""
-    shutil.rmtree(page, ignore_errors=True)
-    page.mkdir(parents=True)
-    build_pages(page)
-    for name, asset in (("ours", ours), ("mesh", mesh)):
-        shutil.copytree(asset.folder, page / name)
-    write_ply(page / "splats.ply", splats)
+    name = f"{len(splats):,} splats, a still, as SPZ"
     panes = [
         {"kind": "player", "name": "ours", "file": "ours/", "bytes": ours.full.entry.bytes},
         {"kind": "player", "name": "one mesh with a video", "file": "mesh/", "bytes": mesh.full.entry.bytes},
-        {
-            "kind": "splats",
-            "name": f"{len(splats):,} splats, a still, as SPZ",
-            "file": "splats.ply",
-            "bytes": SPLAT_BYTES * len(splats),
-        },
+        {"kind": "splats", "name": name, "file": "splats.ply", "bytes": SPLAT_BYTES * len(splats)},
     ]
-    write_json(page / "beside.json", {"panes": panes, "target": [-0.1, 0.0, -0.035], "degrees": 20})
-    (page / "index.html").write_text(PAGE, encoding="utf-8")
+    with atomic_folder(page) as out:
+        build_pages(out)
+        for folder, asset in (("ours", ours), ("mesh", mesh)):
+            shutil.copytree(asset.folder, out / folder)
+        write_ply(out / "splats.ply", splats)
+        write_json(out / "beside.json", {"panes": panes, "target": TARGET})
+        (out / "index.html").write_text(PAGE, encoding="utf-8")
 
 
 def main(

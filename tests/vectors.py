@@ -56,7 +56,7 @@ WINDOW: Window = (-0.5, 0.5, -0.45, 0.45)
 LAYERS, FRAMES, TEXELS, SIDE = 3, 6, 64, 128
 RATE = 30000 / 1001
 BACKGROUND = (64 / 255, 128 / 255, 192 / 255)
-SHOWN_OVER = "#4080c0"
+SHOWN_OVER = "#" + "".join(f"{round(255 * value):02x}" for value in BACKGROUND)
 LEAST = 40.0
 """dB that a player should reach. 8 bits after each layer's blending leave 50 and more, chroma placed otherwise 40."""
 
@@ -149,8 +149,8 @@ def write_vectors(folder: Path) -> int:
 def write_example(folder: Path) -> int:
     """Write `EXAMPLE`, its views and their pictures, whole or not at all; returns how many views."""
     with tempfile.TemporaryDirectory() as made, atomic_folder(folder) as out:
-        write_vectors(Path(made) / "vectors")
         source = Path(made) / "vectors"
+        write_vectors(source)
         views = [view for view in json.loads((source / VIEWS).read_text())["views"] if shown_by_example(view)]
         for name in (EXAMPLE, *(f"{REFERENCE}/{view['file']}" for view in views)):
             shutil.copy(source / name, out)

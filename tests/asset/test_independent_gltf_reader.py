@@ -34,17 +34,22 @@ def asset(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFacto
     return made
 
 
+def seen_through(K: np.ndarray, w2c: np.ndarray, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The eye (3,) and unit rays (M, 3) through places of a picture (M, 2), in the axes of the file's scene: it has y
+    up, so (x, y, z) of the asset is (y, z, x) there."""
+    R, t = w2c[:, :3], w2c[:, 3]
+    rays = np.concatenate([places, np.ones((len(places), 1))], -1) @ np.linalg.inv(K).T @ R
+    rays /= np.linalg.norm(rays, axis=1, keepdims=True)
+    return (-R.T @ t)[[1, 2, 0]], rays[:, [1, 2, 0]]
+
+
 def test_five_views_agree_with_the_reference(asset: Asset) -> None:
     face = Face(asset.folder.with_suffix(".glb").read_bytes())
     picture = face.pictures()[FRAME]
     y, x = (np.mgrid[0 : 2 * SIZE, 0 : 2 * SIZE] + 0.5) / 2  # the centers of the pixels' quarters
     for camera in five_cameras(SIZE):
-        pixels = np.stack([x.ravel(), y.ravel(), np.ones(4 * SIZE * SIZE)], -1)
-        R, t = camera.w2c[:, :3], camera.w2c[:, 3]
-        rays = pixels @ np.linalg.inv(camera.K).T @ R
-        rays /= np.linalg.norm(rays, axis=1, keepdims=True)
-        # The scene of the file has y up: (x, y, z) of the asset is (y, z, x) there.
-        found = face.render((-R.T @ t)[[1, 2, 0]], rays[:, [1, 2, 0]], FRAME, GREY_VALUE, picture)
+        eye, rays = seen_through(camera.K, camera.w2c, np.stack([x.ravel(), y.ravel()], -1))
+        found = face.render(eye, rays, FRAME, GREY_VALUE, picture)
         expected, _ = render(asset, camera, FRAME, (GREY_VALUE,) * 3)
         assert psnr(found.reshape(SIZE, 2, SIZE, 2, 3).mean((1, 3)), expected) >= AGREE, camera.name
 
@@ -63,11 +68,7 @@ def test_the_example_that_is_kept_shows_what_its_pictures_show(vectors: Path) ->
         places = np.arange(2, view["width"], 5)
         pixels = np.stack(np.meshgrid(places, places), -1).reshape(-1, 1, 2)
         quarters = pixels + np.stack(np.meshgrid((0.25, 0.75), (0.25, 0.75)), -1).reshape(1, -1, 2)
-        R, t = np.array(view["w2c"])[:, :3], np.array(view["w2c"])[:, 3]
-        rays = np.concatenate([quarters, np.ones((*quarters.shape[:2], 1))], -1).reshape(-1, 3)
-        rays = rays @ np.linalg.inv(np.array(view["K"])).T @ R
-        rays /= np.linalg.norm(rays, axis=1, keepdims=True)
-        eye, frame = (-R.T @ t)[[1, 2, 0]], view["frame"]
-        found = face.render(eye, rays[:, [1, 2, 0]], frame, np.array(BACKGROUND), pictures[frame])
+        eye, rays = seen_through(np.array(view["K"]), np.array(view["w2c"]), quarters.reshape(-1, 2))
+        found = face.render(eye, rays, view["frame"], np.array(BACKGROUND), pictures[view["frame"]])
         truth = np.asarray(Image.open(KEPT / view["file"]), float)[pixels[:, 0, 1], pixels[:, 0, 0]] / 255
         assert psnr(found.reshape(len(pixels), 4, 3).mean(1), truth) >= AGREE, view["file"]

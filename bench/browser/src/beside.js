@@ -3,8 +3,8 @@ import "/player/facefolds-player.js";
 import * as SPLATS from "@mkkellogg/gaussian-splats-3d";
 import * as THREE from "three";
 
-const { panes, target, degrees } = await (await fetch("beside.json")).json();
-const distance = 1.3;
+const { panes, target } = await (await fetch("beside.json")).json();
+const distance = 0.9;
 const SETTLE = 8; // pictures after a turn until the splats are in order: they are sorted in parts
 const turn = document.querySelector("input");
 const shows = [];
@@ -20,7 +20,6 @@ function player(figure, { file }) {
   element.setAttribute("src", file);
   element.setAttribute("controls", "none");
   element.setAttribute("autoplay", "");
-  element.setAttribute("field-of-view", `${degrees}deg`);
   element.setAttribute("background", "#808080");
   element.addEventListener(
     "load",
@@ -45,26 +44,19 @@ async function splats(figure, { file }) {
   renderer.setClearColor(0x808080);
   renderer.setSize(canvas.clientWidth, canvas.clientHeight);
   canvas.append(renderer.domElement);
-  const camera = new THREE.PerspectiveCamera(
-    degrees,
-    canvas.clientWidth / canvas.clientHeight,
-    0.01,
-    10,
-  );
+  const camera = new THREE.PerspectiveCamera();
+  camera.near = 0.01;
+  camera.aspect = canvas.clientWidth / canvas.clientHeight;
   camera.up.set(0, 0, 1);
   const viewer = new SPLATS.Viewer({
-    ...{
-      renderer,
-      camera,
-      selfDrivenMode: false,
-      useBuiltInControls: false,
-      ignoreDevicePixelRatio: true,
-    },
-    ...{
-      sharedMemoryForWorkers: false,
-      gpuAcceleratedSort: false,
-      sphericalHarmonicsDegree: 1,
-    },
+    renderer,
+    camera,
+    selfDrivenMode: false,
+    useBuiltInControls: false,
+    ignoreDevicePixelRatio: true,
+    sharedMemoryForWorkers: false, // needs headers that a plain static server does not send
+    gpuAcceleratedSort: false,
+    sphericalHarmonicsDegree: 1,
     sceneRevealMode: SPLATS.SceneRevealMode.Instant,
   });
   await viewer.addSplatScene(file, {
@@ -82,6 +74,10 @@ async function splats(figure, { file }) {
     requestAnimationFrame(draw);
   };
   shows.push((azimuth) => {
+    const { view } = document.querySelector("facefolds-player").player;
+    const height = view.size[1] / view.pixelsAUnit; // of its picture at the target: as large as beside
+    camera.fov = (360 / Math.PI) * Math.atan(height / (2 * distance));
+    camera.updateProjectionMatrix();
     const a = (azimuth * Math.PI) / 180;
     camera.position.set(
       target[0] + distance * Math.cos(a),
