@@ -55,6 +55,14 @@ def test_all_panels_are_there_and_fit(open_report: Open, viewport: dict[str, int
     assert page.evaluate(outside) == 0
 
 
+def test_every_tile_says_something_and_one_says_the_assets_size(open_report: Open) -> None:
+    page = open_report()
+    tiles = page.locator(".tiles > div").all_inner_texts()
+    assert len(tiles) > 3 and all(len(tile.splitlines()) > 1 for tile in tiles)
+    (size,) = page.locator(".tiles > div", has_text="Size").locator(".value").all_inner_texts()
+    assert re.fullmatch(r"\d+\sKB", size)
+
+
 def test_the_worst_place_fills_its_column(open_report: Open) -> None:
     page = open_report()
     width = "document.querySelector('.worst{}').getBoundingClientRect().width"
