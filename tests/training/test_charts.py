@@ -190,3 +190,18 @@ def test_layers_reach_as_far_as_the_surface_moves() -> None:
     assert inwards[50:70, 10:30] == pytest.approx(0.034, rel=0.03)
     assert outwards[45:].max() == inwards[:35].max() == outwards[:, 50:].max() == inwards[:, 50:].max() == 0
     assert moves(still, [], np.full((80, 80), 0.006))[0].max() == 0
+
+
+def test_an_edge_that_shifts_by_a_node_is_no_way_along_the_ray() -> None:
+    """Its ray meets the surface behind it, which has not moved; an edge that shifts by nine nodes has."""
+    rows = np.arange(80)[:, None] * np.ones(80)
+
+    def edge(row: int) -> np.ndarray:
+        return np.where(rows < row, 0.2, 0.1)
+
+    def reach(shift: int) -> tuple[float, float]:
+        outwards, inwards = moves(edge(40), [edge(40 - shift), edge(40 + shift)], np.full((80, 80), 0.006))
+        return float(outwards.max()), float(inwards.max())
+
+    assert reach(1) == (0, 0)
+    assert reach(9) == pytest.approx((0.094, 0.094), rel=0.03)

@@ -41,7 +41,7 @@ def red_column(page: Page, azimuth: int) -> float:
     rgb = np.asarray(Image.open(io.BytesIO(shot)).convert("RGB")) / 255
     rows, columns = np.nonzero(rgb[..., 0] - rgb[..., 1] > 0.3)
     assert len(columns) > 100 and rows.mean() == pytest.approx(rgb.shape[0] / 2, abs=2)
-    return float(columns.mean()) - rgb.shape[1] / 2
+    return float(columns.mean() - rgb.shape[1] / 2)
 
 
 def test_three_panes_are_turned_together(player_folder: Path, tmp_path: Path, new_page: Callable[..., Page]) -> None:
@@ -56,7 +56,7 @@ def test_three_panes_are_turned_together(player_folder: Path, tmp_path: Path, ne
         page.goto(address)
         page.wait_for_selector("body[data-ready]", timeout=PATIENCE)
         names = page.locator("figcaption").all_inner_texts()
-        scale = page.evaluate(f"{ELEMENT}.player.view.pixelsAUnit")
+        scale = float(page.evaluate(f"{ELEMENT}.player.view.pixelsAUnit"))
         found = [red_column(page, azimuth) for azimuth in (-60, 0, 60)]
         views = page.evaluate(
             "[...document.querySelectorAll('facefolds-player')].map((e) => Math.round(e.state.view.azimuth))"
