@@ -8,6 +8,7 @@ tell: there is one from where each camera stood only, and there the asset was ma
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from itertools import combinations_with_replacement
 
 import numpy as np
@@ -19,8 +20,9 @@ from facefolds_core.asset.manifest_extras import Directions, FilmedView
 from facefolds_core.asset.reader import AssetLevel
 from facefolds_core.rendering.camera_paths import Eye, camera_of
 from facefolds_core.rendering.raster import cast_layers
-from facefolds_core.rendering.reference import composite, layers_in, seen_from
+from facefolds_core.rendering.reference import layers_in, opacity, seen_from
 from facefolds_core.spacing import spread
+from facefolds_core.system.threads import in_order
 
 SIDE = 200
 """Pixels of the pictures, a side; one ray each."""
@@ -52,8 +54,10 @@ def veil_from(level: AssetLevel) -> Callable[[float, float], float]:
     def worst(azimuth: float, elevation: float) -> float:
         eye = Eye(azimuth, elevation, AWAY * radius, tuple(centre.tolist()))
         camera = camera_of(eye, SIDE, SIDE, FIELD_OF_VIEW)
-        hits = {k: cast_layers(seen_from(level, camera, k), layers_in(level, k)) for k in poses}
-        return max(worst_veil(composite(hits[k], textures)[1]) for k, textures in poses.items())
+        return max(
+            worst_veil(opacity(cast_layers(seen_from(level, camera, k), layers_in(level, k)), textures))
+            for k, textures in poses.items()
+        )
 
     return worst
 
@@ -84,7 +88,8 @@ def good_view(level: AssetLevel, filmed: FilmedView) -> Directions | None:
     """
     azimuths, elevations = (directions(*limits) for limits in (filmed.azimuth, filmed.elevation))
     worst = veil_from(level)
-    found = np.array([[worst(a, e) for a in azimuths] for e in elevations])
+    veils = list(in_order(partial(worst, a, e) for e in elevations for a in azimuths))
+    found = np.reshape(veils, (len(elevations), len(azimuths)))
     smooth = median_filter(found, 3, mode="nearest")  # one direction decides nothing
     typical = float(np.median(smooth[np.ix_(middle_half(elevations), middle_half(azimuths))]))
     start = nearest_to_front(elevations), nearest_to_front(azimuths)

@@ -159,6 +159,15 @@ def composite(
     return rgb, 1 - light
 
 
+def opacity(hits: Hits, textures: Sequence[Texture]) -> Image:
+    """Alpha alone, as `composite` has it: (H, W) float32 in [0, 1]."""
+    light = np.ones(hits.hit.shape[:2], np.float32)
+    for i, texture in enumerate(textures):
+        hit = hits.hit[..., i]
+        light[hit] *= 1 - sample_texture(texture[..., 3:], hits.st[..., i, :][hit])[:, 0]
+    return np.asarray(1 - light, np.float32)
+
+
 def render_asset(asset: Layered, camera: Camera, frame: int, background: ArrayLike = BLACK) -> tuple[Image, Image]:
     """One picture: rgb (H, W, 3) and alpha (H, W) of frame `frame`.
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from facefolds_core.rendering.reference import AssetCaster, Hits, composite, render_asset, sample_texture
+from facefolds_core.rendering.reference import AssetCaster, Hits, composite, opacity, render_asset, sample_texture
 from tests.scenes import look_at_origin
 
 SIZE = 16
@@ -94,7 +94,7 @@ def test_layers_are_composited_in_their_order_not_by_distance() -> None:
 
 
 @pytest.mark.parametrize(
-    ("layers", "background", "colour", "opacity"),
+    ("layers", "background", "colour", "covered"),
     [
         ([(255, 0, 0, 51), (0, 255, 0, 153)], (0, 0, 1), (0.2, 0.8 * 0.6, 0.8 * 0.4), 1 - 0.8 * 0.4),
         *(([(255, 255, 255, 0)] * count, (0.25, 0.5, 0.75), (0.25, 0.5, 0.75), 0) for count in (1, 12, 64)),
@@ -107,12 +107,19 @@ def test_layers_over_a_background(
     layers: list[tuple[int, int, int, int]],
     background: tuple[float, float, float],
     colour: tuple[float, float, float],
-    opacity: float,
+    covered: float,
 ) -> None:
     rgb, alpha = composite(full(len(layers)), constant(layers), background)
     np.testing.assert_allclose(rgb[0, 0], colour, atol=1e-6)
-    np.testing.assert_allclose(alpha[0, 0], opacity, atol=1e-6)
-    assert opacity not in (0, 1) or alpha[0, 0] == opacity
+    np.testing.assert_allclose(alpha[0, 0], covered, atol=1e-6)
+    assert covered not in (0, 1) or alpha[0, 0] == covered
+
+
+def test_opacity_alone_is_that_of_the_picture() -> None:
+    rng = np.random.default_rng(0)
+    hits = Hits(rng.random((8, 8, 3)) < 0.7, rng.random((8, 8, 3, 2)).astype(np.float32))
+    textures = rng.integers(0, 256, (3, 5, 7, 4), np.uint8)
+    np.testing.assert_array_equal(opacity(hits, textures), composite(hits, textures)[1])
 
 
 def test_missed_layers_count_for_nothing() -> None:
