@@ -7,7 +7,7 @@ player interpolates colour and alpha apart, and because the video codec spends n
 
 from __future__ import annotations
 
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 
 import cv2
@@ -18,6 +18,7 @@ from facefolds_core.asset.inputs import check_textures
 from facefolds_core.export.bilinear import Projection
 from facefolds_core.files.frame_store import FrameStore, write_frames
 from facefolds_core.progress import progress
+from facefolds_core.system.threads import in_order
 
 Float = NDArray[np.float32]
 Image = NDArray[np.uint8]
@@ -98,6 +99,10 @@ def resample_store(source: Path, target: Path, size: int) -> FrameStore:
     store = FrameStore(source)
     frames, layers = check_textures(store), store.keys()[-1][0] + 1
     each = progress(range(frames), desc="textures", unit="frame")
-    rows = ((layer, k, resample(store.image(layer, k), size)) for k in each for layer in range(layers))
+
+    def row(layer: int, k: int) -> tuple[int, int, Image]:
+        return layer, k, resample(store.image(layer, k), size)
+
+    rows = in_order(partial(row, layer, k) for k in each for layer in range(layers))
     write_frames(target, (size, size, 4), rows, packed=True)
     return store

@@ -56,6 +56,8 @@ LEAST_NODES = 8
 """Rows and columns of the radius maps, at least."""
 MOVES_MARGIN = 4
 """Nodes of the radius maps around what moves, in which the layers reach as far."""
+SIDEWAYS = 1
+"""Nodes by which an edge may shift: a rim that does has not moved from its surface to the one behind."""
 MIN_VIEW_SHARE = 0.06
 """Of the training cameras: what a smaller share sees of a tracked mesh is its word alone."""
 WINDOW_NODES = 192
@@ -265,9 +267,12 @@ def moves(radius: Array, others: Sequence[Array], halfwidth: Array) -> tuple[Arr
     Returns:
         (rows, columns) each, smooth; 0 where no other frame goes beyond a halfwidth, or no surface is known.
     """
-    found = []
-    for sign in (1.0, -1.0):
-        beyond = [np.nan_to_num(sign * (other - radius) - halfwidth).clip(0) for other in others]
+    size, unknown, found = 2 * SIDEWAYS + 1, np.isnan(radius), []
+    highest = ndimage.maximum_filter(np.where(unknown, -np.inf, radius), size, mode="nearest")
+    lowest = ndimage.minimum_filter(np.where(unknown, np.inf, radius), size, mode="nearest")
+    for sign, edge in ((1.0, highest), (-1.0, lowest)):
+        start = np.where(unknown, np.nan, edge)
+        beyond = [np.nan_to_num(sign * (other - start) - halfwidth).clip(0) for other in others]
         farthest = np.max([np.zeros_like(radius), *beyond], axis=0)
         wide = ndimage.maximum_filter(farthest, 2 * MOVES_MARGIN + 1, mode="nearest")
         found.append(ndimage.gaussian_filter(wide, MOVES_MARGIN / 2, mode="nearest"))
