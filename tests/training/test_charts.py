@@ -192,6 +192,19 @@ def test_layers_reach_as_far_as_the_surface_moves() -> None:
     assert moves(still, [], np.full((80, 80), 0.006))[0].max() == 0
 
 
+def test_a_stray_in_one_frame_is_no_motion() -> None:
+    still = np.full((80, 80), 0.2)
+
+    def reach(side: int) -> float:
+        strayed = still.copy()
+        strayed[40 : 40 + side, 40 : 40 + side] += 0.1
+        outwards, _ = moves(still, [still, strayed], np.full((80, 80), 0.006))
+        return float(outwards.max())
+
+    assert reach(5) == 0
+    assert reach(8) == pytest.approx(0.094, rel=0.03)
+
+
 def test_an_edge_that_shifts_by_a_node_is_no_way_along_the_ray() -> None:
     """Its ray meets the surface behind it, which has not moved; an edge that shifts by nine nodes has."""
     rows = np.arange(80)[:, None] * np.ones(80)

@@ -35,7 +35,7 @@ from facefolds_core.subject.sight import seen_by
 from facefolds_core.subject.splats import Splats
 from facefolds_core.subject.storage import FoundSubject
 from facefolds_core.subject.volume import CELLS, COARSE, Volume, volume_of
-from facefolds_core.training.explicit.second_surface import LAYERS, second_surface
+from facefolds_core.training.explicit.second_surface import LAYERS, large, second_surface
 from facefolds_core.training.explicit.tracked import (
     FAR,
     OPACITY,
@@ -58,6 +58,8 @@ MOVES_MARGIN = 4
 """Nodes of the radius maps around what moves, in which the layers reach as far."""
 SIDEWAYS = 1
 """Nodes by which an edge may shift: a rim that does has not moved from its surface to the one behind."""
+LEAST_MOVED = 30
+"""Nodes of a patch that moves, at least: fewer are strays in one frame, which would be shown as spikes in all."""
 MIN_VIEW_SHARE = 0.06
 """Of the training cameras: what a smaller share sees of a tracked mesh is its word alone."""
 WINDOW_NODES = 192
@@ -274,6 +276,7 @@ def moves(radius: Array, others: Sequence[Array], halfwidth: Array) -> tuple[Arr
         start = np.where(unknown, np.nan, edge)
         beyond = [np.nan_to_num(sign * (other - start) - halfwidth).clip(0) for other in others]
         farthest = np.max([np.zeros_like(radius), *beyond], axis=0)
+        farthest = np.where(large(farthest > 0, LEAST_MOVED), farthest, 0)
         wide = ndimage.maximum_filter(farthest, 2 * MOVES_MARGIN + 1, mode="nearest")
         found.append(ndimage.gaussian_filter(wide, MOVES_MARGIN / 2, mode="nearest"))
     return found[0], found[1]

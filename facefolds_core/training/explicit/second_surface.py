@@ -63,7 +63,7 @@ def second_surface(volume: Volume, chart: Chart, window: Window, inner: Array, c
     near = radius > outermost[i, j] - CLOSE
     i, j, radius = i[near], j[near], radius[near]
     found, count = _smooth(inner.shape, i, j, radius, np.ones(len(radius)))
-    known = _large(count > LEAST_POINTS)
+    known = large(count > LEAST_POINTS, LEAST_NODES)
     if not known.any():
         return np.zeros(inner.shape)
     nearest = ndimage.distance_transform_edt(~known, return_distances=False, return_indices=True)
@@ -125,9 +125,9 @@ def _smooth(
     return total / np.maximum(count, 1e-300), count
 
 
-def _large(known: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Without the patches of fewer nodes than LEAST_NODES."""
+def large(known: NDArray[np.bool_], least: int) -> NDArray[np.bool_]:
+    """Without the patches of fewer nodes than `least`."""
     labels, _ = ndimage.label(known, np.ones((3, 3)))
     sizes = np.bincount(labels.ravel())
     sizes[0] = 0
-    return np.asarray((sizes >= LEAST_NODES)[labels])
+    return np.asarray((sizes >= least)[labels])
