@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -22,6 +23,7 @@ from facefolds_core.files.frame_store import write_frames
 from facefolds_core.geometry.chart import Chart
 from facefolds_core.geometry.sphere_uv import Window, row_strides, texel_uv, uv_to_st
 from facefolds_core.progress import progress
+from facefolds_core.system.threads import in_order
 
 if TYPE_CHECKING:
     from facefolds_core.model.radiance import RadianceManifolds
@@ -33,6 +35,7 @@ LEAST = 512
 """Least R that `sample.resolution: auto` takes."""
 
 Array = NDArray[np.float64]
+Single = NDArray[np.float32]
 
 
 def samples_for(model: RadianceManifolds, window: Window) -> int:
@@ -145,16 +148,26 @@ def texture_rows(model: RadianceManifolds, grids: Grids) -> Iterator[tuple[int, 
         UserError: if the model gives a colour or an alpha that is not finite.
     """
     images = [_images(model, n, grids.window(n), grids.valid[n]) for n in range(grids.num_layers)]
-    for frame in progress(range(model.num_frames), desc="textures", unit="frame"):
-        for layer, image in enumerate(images):
-            yield layer, frame, image(frame)
+
+    def work() -> Iterator[Callable[[], tuple[int, int, NDArray[np.uint8]]]]:
+        for frame in progress(range(model.num_frames), desc="textures", unit="frame"):
+            for layer, (texels, drawn) in enumerate(images):
+                yield partial(_row, layer, frame, drawn, texels(frame))
+
+    return in_order(work())
+
+
+def _row(
+    layer: int, frame: int, drawn: Callable[[Single], NDArray[np.uint8]], texels: Single
+) -> tuple[int, int, NDArray[np.uint8]]:
+    return layer, frame, drawn(texels)
 
 
 def _images(
     model: RadianceManifolds, layer: int, window: Window, valid: NDArray[np.bool_]
-) -> Callable[[int], NDArray[np.uint8]]:
-    """A function of the frame: (R, R, 4) RGBA of a layer in its window; of a model with texels, those that interpolate
-    to what it shows; of others, its values."""
+) -> tuple[Callable[[int], Single], Callable[[Single], NDArray[np.uint8]]]:
+    """What the model shows of a layer in a frame, (M, 4); and what makes (R, R, 4) RGBA in its window of that: of a
+    model with texels, those that interpolate to it; of others, its values."""
     grid, size = model.texel_grid(), len(valid)
     if grid is None:
         places = texel_uv(size, size, window)[valid]
@@ -164,19 +177,21 @@ def _images(
         (left, top), (right, bottom) = np.asarray(uv_to_st(corners, grid.window)).tolist()
         projection = Projection(grid.shape, (size, size), (top, bottom, left, right))
 
-    def image(frame: int) -> NDArray[np.uint8]:
-        values = _texels(model, torch.as_tensor(places).to(model.centre.detach()), layer, frame)
+    def texels(frame: int) -> Single:
+        return _texels(model, torch.as_tensor(places).to(model.centre.detach()), layer, frame)
+
+    def drawn(values: Single) -> NDArray[np.uint8]:
         if grid is not None:
             values = projection(values.reshape(*grid.shape, 4))[valid]
         found = np.zeros((*valid.shape, 4), np.uint8)
         found[valid] = np.rint(values * np.float32(255))
         return found
 
-    return image
+    return texels, drawn
 
 
 @torch.no_grad()
-def _texels(model: RadianceManifolds, uv: Tensor, layer: int, frame: int) -> NDArray[np.float32]:
+def _texels(model: RadianceManifolds, uv: Tensor, layer: int, frame: int) -> Single:
     """(M, 4) RGBA in [0, 1] at uv [M, 2]."""
     rgb, alpha = model.texture(uv, layer, float(frame))
     rgba = torch.cat([rgb, alpha[:, None]], -1)
