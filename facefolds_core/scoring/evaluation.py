@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from contextlib import nullcontext
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +29,7 @@ from facefolds_core.scoring.temporal import Film, Sums, change_of
 from facefolds_core.scoring.training_views import training_views
 from facefolds_core.scoring.truths import Truth, Truths
 from facefolds_core.spacing import spread
+from facefolds_core.system.threads import in_order
 
 SCORED: tuple[Split, ...] = ("holdout", "validate")
 
@@ -110,7 +112,8 @@ class _Scorer:
         """
         camera, background, film = self._scene.cameras[index], self._params.background, Film()
         frames = [k for c, k in self.keys if c == index]
-        for k, renderings in rendered(view, self._asset, frames):
+        views = rendered(view, self._asset, frames)
+        for k, renderings in in_order((partial(next, views) for _ in frames), threads=1):  # while one is scored
             frame, truth = self._scene.frame_ids[k], self._truths.at(index, k)
             _check_finite(renderings, camera.name, frame)
             pictures = {variant: shown(one.over(background)) for variant, one in renderings.items()}
