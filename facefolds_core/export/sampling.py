@@ -207,7 +207,7 @@ def _texels(model: RadianceManifolds, uv: Tensor, layer: int, frame: int) -> Sin
 
 
 def write_textures(path: Path, model: RadianceManifolds, grids: Grids) -> NDArray[np.uint8]:
-    """Write all texture images to a layered frame store (camera := layer), holding one frame's in memory.
+    """Write all texture images to a layered frame store (camera := layer), holding a few in memory.
 
     Returns:
         (N, R, R) largest alpha of any frame.

@@ -100,9 +100,9 @@ def resample_store(source: Path, target: Path, size: int) -> FrameStore:
     frames, layers = check_textures(store), store.keys()[-1][0] + 1
     each = progress(range(frames), desc="textures", unit="frame")
 
-    def row(layer: int, k: int) -> tuple[int, int, Image]:
-        return layer, k, resample(store.image(layer, k), size)
+    def row(layer: int, k: int, image: Image) -> tuple[int, int, Image]:
+        return layer, k, resample(image, size)
 
-    rows = in_order(partial(row, layer, k) for k in each for layer in range(layers))
+    rows = in_order(partial(row, layer, k, store.image(layer, k)) for k in each for layer in range(layers))
     write_frames(target, (size, size, 4), rows, packed=True)
     return store

@@ -71,9 +71,9 @@ def worst_veil(alpha: NDArray[np.floating]) -> float:
     Returns:
         in [0, 1]; 0 where no patch shows the subject.
     """
-    opacity = alpha.astype(np.float64)
-    side = min(max(LEAST_PATCH, round(PATCH_SHARE * float(np.sqrt(opacity.sum())))), *opacity.shape)
-    cover, veil = (uniform_filter(one, side, mode="constant") for one in (opacity, 4 * opacity * (1 - opacity)))
+    exact = alpha.astype(np.float64)
+    side = min(max(LEAST_PATCH, round(PATCH_SHARE * float(np.sqrt(exact.sum())))), *exact.shape)
+    cover, veil = (uniform_filter(one, side, mode="constant") for one in (exact, 4 * exact * (1 - exact)))
     return float(np.where(cover >= COVERED, veil, 0).max())
 
 

@@ -162,7 +162,7 @@ def composite(
 def opacity(hits: Hits, textures: Sequence[Texture]) -> Image:
     """Alpha alone, as `composite` has it: (H, W) float32 in [0, 1]."""
     light = np.ones(hits.hit.shape[:2], np.float32)
-    for i, texture in enumerate(textures):
+    for i, texture in zip(range(hits.hit.shape[2]), textures, strict=True):
         hit = hits.hit[..., i]
         light[hit] *= 1 - sample_texture(texture[..., 3:], hits.st[..., i, :][hit])[:, 0]
     return np.asarray(1 - light, np.float32)

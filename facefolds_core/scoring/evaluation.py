@@ -1,5 +1,5 @@
 """Score the shipped asset, and the model it came from, on cameras that did not train (docs/reference/metrics.md).
-One camera at a time, one frame at a time: memory is bounded by one camera's crossings, whatever the number of images.
+One camera at a time, a few frames at a time: memory is bounded by one camera's crossings, however many images there are.
 """
 
 from __future__ import annotations
@@ -113,7 +113,7 @@ class _Scorer:
         camera, background, film = self._scene.cameras[index], self._params.background, Film()
         frames = [k for c, k in self.keys if c == index]
         views = rendered(view, self._asset, frames)
-        for k, renderings in in_order((partial(next, views) for _ in frames), threads=1):  # while one is scored
+        for k, renderings in in_order((partial(next, views) for _ in frames), threads=1):  # while others are scored
             frame, truth = self._scene.frame_ids[k], self._truths.at(index, k)
             _check_finite(renderings, camera.name, frame)
             pictures = {variant: shown(one.over(background)) for variant, one in renderings.items()}
@@ -131,6 +131,7 @@ class _Scorer:
             if roll is not None:
                 roll.add(frame, truth.picture, panel.shown)
             bar.update()
+        next(views, None)  # to the end of the video, whose frames are counted there
         return film.sums()
 
     def _keep(self, k: int, panel: Panel, asset: Rendering, truth: Truth) -> None:

@@ -10,11 +10,14 @@ from typing import TypeVar
 
 T = TypeVar("T")
 
+MOST = 4
+"""Threads by default, at most: each holds its work in memory."""
+
 
 def in_order(work: Iterable[Callable[[], T]], threads: int | None = None) -> Iterator[T]:
     """What functions return, in their order: two a thread are begun before they are asked for. By default a thread a
-    core."""
-    threads = threads or os.cpu_count() or 1
+    core, up to MOST."""
+    threads = threads or min(os.cpu_count() or 1, MOST)
     with ThreadPoolExecutor(threads) as pool:
         waiting: deque[Future[T]] = deque()
         try:

@@ -32,12 +32,19 @@ def red_ball(beside: float, count: int = 300) -> Splats:
     return Splats(values, np.zeros(3, np.float32))
 
 
+def shot_of(page: Page) -> bytes:
+    """The pane of the splats, a PNG."""
+    return page.locator("figure").nth(2).locator("canvas").screenshot(timeout=PATIENCE)
+
+
 def red_column(page: Page, azimuth: int) -> float:
     """Where it is seen in the pane of the splats, turned so far: pixels to the right of that pane's middle."""
     turn = "(v) => { const e = document.querySelector('input'); e.value = v; e.dispatchEvent(new Event('input')) }"
     page.evaluate(turn, azimuth)
-    page.wait_for_timeout(1500)
-    shot = page.locator("figure").nth(2).locator("canvas").screenshot(timeout=PATIENCE)
+    before, shot = b"", shot_of(page)
+    while shot != before:  # drawn again until the splats are in order
+        page.wait_for_timeout(1000)
+        before, shot = shot, shot_of(page)
     rgb = np.asarray(Image.open(io.BytesIO(shot)).convert("RGB")) / 255
     rows, columns = np.nonzero(rgb[..., 0] - rgb[..., 1] > 0.3)
     assert len(columns) > 100 and rows.mean() == pytest.approx(rgb.shape[0] / 2, abs=2)

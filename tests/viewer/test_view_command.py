@@ -79,7 +79,7 @@ def test_it_serves_until_it_is_interrupted(tmp_path: Path, player_folder: Path, 
 
 
 @pytest.mark.parametrize("name", ["asset.glb", "asset/manifest.json"])
-def test_what_it_serves_plays(
+def test_what_it_serves_is_shown(
     tmp_path: Path, rich: Path, player_folder: Path, project_root: Path, new_page: Callable[..., Page], name: str
 ) -> None:
     (tmp_path / "asset").symlink_to(rich)

@@ -57,7 +57,7 @@ LEAST_NODES = 8
 MOVES_MARGIN = 4
 """Nodes of the radius maps around what moves, in which the layers reach as far."""
 SIDEWAYS = 1
-"""Nodes by which an edge may shift: a rim that does has not moved from its surface to the one behind."""
+"""Nodes, of 384 a row, by which an edge may shift: a rim that does has not moved from its surface to the one behind."""
 LEAST_MOVED = 30
 """Nodes of a patch that moves, at least: fewer are strays in one frame, which would be shown as spikes in all."""
 MIN_VIEW_SHARE = 0.06
@@ -267,15 +267,17 @@ def moves(radius: Array, others: Sequence[Array], halfwidth: Array) -> tuple[Arr
         halfwidth: (rows, columns) of the layers there, units.
 
     Returns:
-        (rows, columns) each, smooth; 0 where no other frame goes beyond a halfwidth, or no surface is known.
+        (rows, columns) each, smooth; 0 where no other frame goes beyond a halfwidth, or no surface is known; nor do
+        edges that shift by SIDEWAYS count, or patches of fewer than LEAST_MOVED nodes.
     """
     size, unknown, found = 2 * SIDEWAYS + 1, np.isnan(radius), []
     highest = ndimage.maximum_filter(np.where(unknown, -np.inf, radius), size, mode="nearest")
     lowest = ndimage.minimum_filter(np.where(unknown, np.inf, radius), size, mode="nearest")
     for sign, edge in ((1.0, highest), (-1.0, lowest)):
-        start = np.where(unknown, np.nan, edge)
-        beyond = [np.nan_to_num(sign * (other - start) - halfwidth).clip(0) for other in others]
-        farthest = np.max([np.zeros_like(radius), *beyond], axis=0)
+        farthest = np.zeros_like(radius)
+        for other in others:
+            moved = sign * (other - np.where(unknown, np.nan, edge)) > halfwidth
+            farthest = np.maximum(farthest, np.where(moved, sign * (other - radius) - halfwidth, 0))
         farthest = np.where(large(farthest > 0, LEAST_MOVED), farthest, 0)
         wide = ndimage.maximum_filter(farthest, 2 * MOVES_MARGIN + 1, mode="nearest")
         found.append(ndimage.gaussian_filter(wide, MOVES_MARGIN / 2, mode="nearest"))
