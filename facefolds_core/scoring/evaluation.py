@@ -1,5 +1,5 @@
 """Score the shipped asset, and the model it came from, on cameras that did not train (docs/reference/metrics.md).
-One camera at a time, a few frames at a time: memory is bounded by one camera's crossings, however many images there are.
+One camera at a time, a few frames at a time: memory is bounded by one camera's crossings, whatever the take's length.
 """
 
 from __future__ import annotations
