@@ -192,12 +192,6 @@ def test_layers_reach_as_far_as_the_surface_moves() -> None:
     assert moves(still, [], np.full((80, 80), 0.006))[0].max() == 0
 
 
-def test_a_slope_that_moves_is_reached_as_far_as_it_goes() -> None:
-    slope = 0.2 + 0.002 * np.arange(80)[:, None] * np.ones(80)
-    outwards, inwards = moves(slope, [slope + 0.03, slope - 0.03], np.full((80, 80), 0.006))
-    assert outwards[20:60] == pytest.approx(0.024, rel=0.01) and inwards[20:60] == pytest.approx(0.024, rel=0.01)
-
-
 def test_a_stray_in_one_frame_is_no_motion() -> None:
     still = np.full((80, 80), 0.2)
 

@@ -269,15 +269,15 @@ def moves(radius: Array, others: Sequence[Array], halfwidth: Array) -> tuple[Arr
     Returns:
         (rows, columns) each, smooth; 0 where no other frame goes beyond a halfwidth, or no surface is known; nor do
         edges that shift by SIDEWAYS count, or patches of fewer than LEAST_MOVED nodes.
+        On a slope that is SIDEWAYS nodes' rise too little; from the node's own radius the actor lost 0.14 dB.
     """
     size, unknown, found = 2 * SIDEWAYS + 1, np.isnan(radius), []
     highest = ndimage.maximum_filter(np.where(unknown, -np.inf, radius), size, mode="nearest")
     lowest = ndimage.minimum_filter(np.where(unknown, np.inf, radius), size, mode="nearest")
     for sign, edge in ((1.0, highest), (-1.0, lowest)):
-        farthest = np.zeros_like(radius)
-        for other in others:
-            moved = sign * (other - np.where(unknown, np.nan, edge)) > halfwidth
-            farthest = np.maximum(farthest, np.where(moved, sign * (other - radius) - halfwidth, 0))
+        start = np.where(unknown, np.nan, edge)
+        beyond = [np.nan_to_num(sign * (other - start) - halfwidth).clip(0) for other in others]
+        farthest = np.max([np.zeros_like(radius), *beyond], axis=0)
         farthest = np.where(large(farthest > 0, LEAST_MOVED), farthest, 0)
         wide = ndimage.maximum_filter(farthest, 2 * MOVES_MARGIN + 1, mode="nearest")
         found.append(ndimage.gaussian_filter(wide, MOVES_MARGIN / 2, mode="nearest"))
