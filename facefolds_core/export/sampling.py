@@ -149,18 +149,12 @@ def texture_rows(model: RadianceManifolds, grids: Grids) -> Iterator[tuple[int, 
     """
     images = [_images(model, n, grids.window(n), grids.valid[n]) for n in range(grids.num_layers)]
 
-    def work() -> Iterator[Callable[[], tuple[int, int, NDArray[np.uint8]]]]:
-        for frame in progress(range(model.num_frames), desc="textures", unit="frame"):
-            for layer, (texels, drawn) in enumerate(images):
-                yield partial(_row, layer, frame, drawn, texels(frame))
+    each = progress(range(model.num_frames), desc="textures", unit="frame")
 
-    return in_order(work())
+    def row(layer: int, frame: int, values: Single) -> tuple[int, int, NDArray[np.uint8]]:
+        return layer, frame, images[layer][1](values)
 
-
-def _row(
-    layer: int, frame: int, drawn: Callable[[Single], NDArray[np.uint8]], texels: Single
-) -> tuple[int, int, NDArray[np.uint8]]:
-    return layer, frame, drawn(texels)
+    return in_order(partial(row, n, frame, texels(frame)) for frame in each for n, (texels, _) in enumerate(images))
 
 
 def _images(
