@@ -257,14 +257,17 @@ class Mattes:
 
     def _seen(self, key: Key) -> tuple[Array, Array]:
         """(H, W) opacity of the subject's Gaussians, and (H, W, 3) what stands behind them: of a head that turns the
-        room as it stood when they were fitted."""
+        room as it stood when they were fitted. A room without texture may have Gaussians close beside the body: nothing
+        told them from what lies far behind. A head that turns would go through them, so there they cover nothing."""
         assert self.body is not None
         with self._drawing:
             same = self._view(key)
             if self._drawn is None or self._drawn[0] != same:
                 body, room = self.body, self.scene.camera_in_head(key[0], self.body.frame)
-                there = self._in_frame(body.splats, self.stands, body.frame, key[1])
-                seen = opacity_of(there, body.subject, self.scene.camera_in_head(*key))
+                there, subject = self._in_frame(body.splats, self.stands, body.frame, key[1]), body.subject
+                if self.scene.poses is not None and key[1] != body.frame:
+                    there, subject = there.part(subject), subject[subject]
+                seen = opacity_of(there, subject, self.scene.camera_in_head(*key))
                 self._drawn = same, (seen, background(body.splats, body.subject, room))
             return self._drawn[1]
 
