@@ -251,23 +251,29 @@ class Mattes:
         poses = self.scene.poses
         return splats if poses is None else in_frame(splats, stands, poses, first, frame)
 
+    @cached_property
+    def _stands_with(self) -> Bool:
+        """(N,) which of the body's Gaussians are drawn as if they stood still: of its own those that do, of the room's
+        those whose nearest does. A room without texture has Gaussians close beside the body, since nothing tells them
+        from what lies far behind; a head that turns would go through them."""
+        assert self.body is not None
+        own, means = self.body.subject, self.body.splats.means
+        return np.asarray(self.stands[own][cKDTree(means[own]).query(means)[1]])
+
     def _view(self, key: Key) -> Key:
         """Which pictures show the subject from the same place: all of a camera, but of a head that turns."""
         return key if self.scene.poses is not None else (key[0], 0)
 
     def _seen(self, key: Key) -> tuple[Array, Array]:
         """(H, W) opacity of the subject's Gaussians, and (H, W, 3) what stands behind them: of a head that turns the
-        room as it stood when they were fitted. A room without texture may have Gaussians close beside the body: nothing
-        told them from what lies far behind. A head that turns would go through them, so there they cover nothing."""
+        room as it stood when they were fitted."""
         assert self.body is not None
         with self._drawing:
             same = self._view(key)
             if self._drawn is None or self._drawn[0] != same:
                 body, room = self.body, self.scene.camera_in_head(key[0], self.body.frame)
-                there, subject = self._in_frame(body.splats, self.stands, body.frame, key[1]), body.subject
-                if self.scene.poses is not None and key[1] != body.frame:
-                    there, subject = there.part(subject), subject[subject]
-                seen = opacity_of(there, subject, self.scene.camera_in_head(*key))
+                there = self._in_frame(body.splats, self._stands_with, body.frame, key[1])
+                seen = opacity_of(there, body.subject, self.scene.camera_in_head(*key))
                 self._drawn = same, (seen, background(body.splats, body.subject, room))
             return self._drawn[1]
 
