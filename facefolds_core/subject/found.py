@@ -16,7 +16,7 @@ from facefolds_core.errors import UserError
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.subject.drawing import draw, view_of
 from facefolds_core.subject.sight import seen_by
-from facefolds_core.subject.splats import Splats, longest_axes
+from facefolds_core.subject.splats import Splats, axes_of, longest_axes
 
 Array = NDArray[np.float32]
 Bool = NDArray[np.bool_]
@@ -42,6 +42,8 @@ pictures' edges are in two."""
 SURROUNDING = 0.5
 """Length of the mean direction in which a body leaves the ball, below which it leaves it all around: a wall that
 surrounds the subject has 0, a neck and chest 0.8."""
+FACE = tuple((a, b) for a in np.linspace(-1.5, 1.5, 7) for b in np.linspace(-1.5, 1.5, 7) if np.hypot(a, b) <= 1.5)
+"""Points of a Gaussian's face, standard deviations along its two longer axes."""
 DIRECTIONS = 3
 """Directions are told apart by so many steps from the middle to each side."""
 DOUBT = 0.7
@@ -172,13 +174,13 @@ def _steps(means: Array, ends: Array, first: Bool, voxel: float) -> Array:
 
 
 def _scatter(weight: Array, splats: Splats, chosen: Bool, amount: Array, low: Array, voxel: float) -> None:
-    """Put Gaussians into cells: at their means, and one standard deviation to both sides along their longest axes."""
-    ends = longest_axes(splats.values[chosen])
-    for side in (-1, 0, 1):
-        places = splats.means[chosen] + side * ends
+    """Put Gaussians into cells, by points on their faces: smooth skin has few large ones, which touch at their rims."""
+    axes = axes_of(splats.values[chosen])
+    for along, across in FACE:
+        places = splats.means[chosen] + along * axes[:, 0] + across * axes[:, 1]
         cells = np.floor((places - low) / voxel).astype(np.int64)
         inside = ((cells >= 0) & (cells < weight.shape)).all(1)
-        np.add.at(weight, tuple(cells[inside].T), amount[chosen][inside] / 3)
+        np.add.at(weight, tuple(cells[inside].T), amount[chosen][inside] / len(FACE))
 
 
 def opacity_of(splats: Splats, subject: Bool | Array, camera: Camera) -> Array:

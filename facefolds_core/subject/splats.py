@@ -29,15 +29,20 @@ COLUMNS = 23
 
 def longest_axes(values: Array) -> Array:
     """(n, 3) along the longest axes of Gaussians (n, COLUMNS), one standard deviation long."""
+    return axes_of(values)[:, 0]
+
+
+def axes_of(values: Array) -> Array:
+    """(n, 3, 3) the axes of Gaussians (n, COLUMNS), one standard deviation long, the longest first."""
     w, x, y, z = (values[:, TURN] / np.linalg.norm(values[:, TURN], axis=1, keepdims=True)).T
     columns = [
         [1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)],
         [2 * (x * y - w * z), 1 - 2 * (x * x + z * z), 2 * (y * z + w * x)],
         [2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)],
     ]
-    rows, longest = np.arange(len(values)), np.argmax(values[:, SCALE], 1)
-    axes = np.array(columns).transpose(2, 0, 1)[rows, longest]
-    return np.asarray(axes * np.exp(values[rows, 3 + longest])[:, None], np.float32)
+    rows, order = np.arange(len(values))[:, None], np.argsort(-values[:, SCALE], 1, kind="stable")
+    axes = np.array(columns).transpose(2, 0, 1)[rows, order]
+    return np.asarray(axes * np.exp(values[:, SCALE][rows, order])[..., None], np.float32)
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,7 @@ from facefolds_core.subject.folder import RED, make_folder, tile
 from facefolds_core.subject.found import DOUBT, belief, joined, subject_of
 from facefolds_core.subject.mattes import Matte, Mattes
 from facefolds_core.subject.ply import write_ply
-from facefolds_core.subject.splats import MEAN, OPACITY, SCALE, Splats
+from facefolds_core.subject.splats import MEAN, OPACITY, SCALE, TURN, Splats
 from facefolds_core.subject.storage import BODY, Body, read_found, write_body, write_found
 from tests.assets import TORSO
 from tests.scenes import CENTRE, OPAQUE, gaussians, make_scene, render
@@ -262,6 +262,16 @@ def test_what_is_joined_to_the_subject_towards_the_cameras_is_its(tmp_path: Path
     away = np.linspace(0, 0.7, 71)
     found = subject_of(small(np.concatenate([away[:, None] * towards, away[:, None] * aside])), scene)
     assert found[:71].all() and found[71:][away < 0.44].all() and not found[71:][away > 0.46].any()
+
+
+def test_a_large_gaussian_is_joined_by_all_of_its_face(tmp_path: Path) -> None:
+    """As on a smooth cheek, which has few."""
+    line = np.linspace(-0.1, 0.1, 21)
+    splats = small(np.concatenate([line[:, None] * [1.0, 0, 0], [[0, 0.07, 0]]]))
+    splats.values[-1, SCALE], splats.values[-1, TURN] = np.log([0.06, 0.05, 0.001]), (1, 0, 0, 0)
+    assert subject_of(splats, seen_widely(tmp_path)[0]).all()
+    splats.values[-1, SCALE] = np.log([0.06, 0.001, 0.05])
+    assert not subject_of(splats, seen_widely(tmp_path)[0])[-1]
 
 
 def test_a_wall_that_the_ball_cuts_off_all_around_is_doubtful_and_a_neck_is_not(tmp_path: Path) -> None:
