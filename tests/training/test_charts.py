@@ -152,6 +152,14 @@ def test_windows_reach_behind_the_ears_and_below_the_pole_where_something_is_see
     assert fit_window(bust, chart, back, None, START, around=True)[2:] == (-2, 2)  # one line
 
 
+def test_one_point_seen_behind_the_subject_widens_no_window(bust: Volume) -> None:
+    chart = Chart((AXIS, 0.0, 0.0), Belt(math.radians(10), 0.25))
+    face = chart.points(np.random.default_rng(0).uniform(-0.4, 0.4, (4000, 2)), np.full(4000, HEAD))
+    stray = chart.points(np.array([[0.0, -1.3]]), np.full(1, HEAD))
+    alone, both = (fit_window(bust, chart, points, None, START) for points in (face, np.vstack([face, stray])))
+    assert both == alone and alone[2] > -0.6
+
+
 def test_a_subject_beyond_every_window_is_said(bust: Volume) -> None:
     behind = np.array([[AXIS - 0.3, 0.001, 0.0], [AXIS - 0.3, -0.001, 0.0]])
     with pytest.raises(UserError, match="has a place"):

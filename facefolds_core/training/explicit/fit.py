@@ -66,6 +66,9 @@ WINDOW_NODES = 192
 """Rows and columns of (u, v) at which it is asked whether there is something of the subject."""
 NEAR_NODES = 4
 """Of these nodes around the points that cameras see: as far apart as a node or farther, these leave gaps."""
+LEAST_PATCH = 0.01
+"""Of the nodes that hold something: a smaller patch is one point that a camera saw behind the subject, and would move a
+border of the window by half a radian."""
 WINDOW_MARGIN = 0.04
 """Margin of the window in u and v beyond what holds the subject."""
 MAX_HALFWIDTH_PIXELS = 8.0
@@ -221,7 +224,8 @@ def fit_window(
     seen = np.zeros((WINDOW_NODES, WINDOW_NODES), bool)
     seen[last - nodes[:, 0], nodes[:, 1]] = True
     near = ndimage.binary_dilation(seen, iterations=NEAR_NODES)
-    held = [uv[near & (profile(volume, chart, uv, least).opacity >= least)]]
+    subject = near & (profile(volume, chart, uv, least).opacity >= least)
+    held = [uv[large(subject, math.ceil(LEAST_PATCH * subject.sum()))]]
     if vertices is not None:
         places, _ = chart.uv(some_frames(vertices).reshape(-1, 3))
         held.append(places[((places >= lowest) & (places <= highest)).all(1) & (np.abs(places[:, 1]) <= 1)])

@@ -128,6 +128,4 @@ def _smooth(
 def large(known: NDArray[np.bool_], least: int) -> NDArray[np.bool_]:
     """Without the patches of fewer nodes than `least`."""
     labels, _ = ndimage.label(known, np.ones((3, 3)))
-    sizes = np.bincount(labels.ravel())
-    sizes[0] = 0
-    return np.asarray((sizes >= least)[labels])
+    return np.asarray(known & (np.bincount(labels.ravel()) >= least)[labels])
