@@ -42,8 +42,9 @@ pictures' edges are in two."""
 SURROUNDING = 0.5
 """Length of the mean direction in which a body leaves the ball, below which it leaves it all around: a wall that
 surrounds the subject has 0, a neck and chest 0.8."""
-FACE = tuple((a, b) for a in np.linspace(-1.5, 1.5, 7) for b in np.linspace(-1.5, 1.5, 7) if np.hypot(a, b) <= 1.5)
-"""Points of a Gaussian's face, standard deviations along its two longer axes."""
+FACE = tuple((a, b) for a in np.linspace(-1.0, 1.0, 7) for b in np.linspace(-1.0, 1.0, 7) if np.hypot(a, b) <= 1.0)
+"""Points of a Gaussian's face, standard deviations along its two longer axes. Of 1.5 instead of 1 room beside hair is
+joined to it."""
 DIRECTIONS = 3
 """Directions are told apart by so many steps from the middle to each side."""
 DOUBT = 0.7
