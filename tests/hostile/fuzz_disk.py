@@ -44,9 +44,9 @@ subjects:
     source: actor
     path: facefolds_core/captures/actor
     holdout: {every: 4}
-capture: {cameras: 6, frames: 2, height: 48, width: 32}
+capture: {cameras: 6, frames: 2, height: 48, width: 32, plates: false, mattes: true}
 normalize: {}
-subject: {iterations: 10}
+subject: {iterations: 10, fewest: 200}
 train: {preset: quick, iterations: 8, checkpoint_seconds: 0.001, rays: 128, layers: 3, texture_width: 16,
         manifold_width: 16}
 sample: {resolution: 32}
@@ -55,7 +55,7 @@ decimate: {resolution: 8}
 texture: {resolution: 16}
 bake: {hold: 0.02}
 compress: {photos: 1, levels: [], video: {codec: [h264], target_psnr: null, preset: fast}}
-evaluate: {}
+evaluate: {films: false, sheet_frames: 1}
 """
 DISK = 32 * 2**20
 """Bytes of the small disk."""

@@ -171,7 +171,7 @@ def test_a_tracked_mesh_of_another_size_is_left_out_and_said(
     models = []
     for name, radius in (("none", None), ("larger", 1.25 * OPAQUE[0].radius)):
         scene = make_scene(tmp_path / name / "scene", size=32, surface_radius=radius, mattes=True)
-        folder = _fitted(scene, tmp_path / name)
+        folder = _fitted(scene, tmp_path / name, iterations=1, geometry={"nodes": 48, "round_iterations": 1})
         said = capsys.readouterr().out, (folder / "fit.json").read_text()
         assert all(("left out" in words) == (name == "larger") for words in said)
         models.append(load_model(folder).state_dict())

@@ -71,7 +71,7 @@ def test_a_turn_is_recorded(player: Player, tmp_path: Path) -> None:
     """As long as was asked for, whatever the machine's speed; the camera moves in each picture; with the sound."""
     player.run("e.player.view.set({azimuth: 5, elevation: 3, distance: 1.1, target: [0, 0, 0]}); await e.seek(2)")
     before = player.run("return [e.player.view.get(), e.playing, e.frame]")
-    code = """const film = await e.record({seconds: 3, degrees: 30});
+    code = """const film = await e.record({seconds: 1.5, degrees: 30});
         const text = await new Promise((done) => {
             const reader = new FileReader(); reader.onload = () => done(reader.result); reader.readAsDataURL(film); });
         return [film.type, text.split(',')[1]];"""
@@ -79,10 +79,10 @@ def test_a_turn_is_recorded(player: Player, tmp_path: Path) -> None:
     assert kind in ("video/mp4", "video/webm")
     (tmp_path / "turn").write_bytes(base64.b64decode(data))
     pictures, seconds, sound = film_of(tmp_path / "turn")
-    assert len(pictures) == 90 and seconds == pytest.approx(3, abs=0.01)
+    assert len(pictures) == 45 and seconds == pytest.approx(1.5, abs=0.01)
     steps = [np.abs(b - a).mean() for a, b in pairwise(pictures)]
     assert min(steps) > 0.02 and max(np.abs(one - pictures[0]).mean() for one in pictures) > 5
-    assert len(sound) == pytest.approx(3 * 48000, rel=0.02) and np.abs(sound[-24000:]).max() > 0.01  # it loops, too
+    assert len(sound) == pytest.approx(1.5 * 48000, rel=0.02) and np.abs(sound[-24000:]).max() > 0.01  # it loops, too
     assert player.run("return [e.player.view.get(), e.playing, e.frame]") == before
 
 
