@@ -113,6 +113,13 @@ export class FacefoldsPlayer extends HTMLElement {
   disableTap: boolean;
   /** A factor of the light; 1 by default. */
   exposure: number;
+  /** Folder, manifest.json or .glb of the asset. */
+  src: string;
+  /** What screen readers say of it. */
+  alt: string;
+  /** Address of a picture shown until the asset is. */
+  poster: string;
+  loading: "auto" | "lazy";
   /** "manual": only the poster is fetched, until `dismissPoster()`. */
   reveal: "auto" | "manual";
   dismissPoster(): void;

@@ -33,6 +33,7 @@ from facefolds_core.rendering.camera_paths import (
     SIDEWAYS,
     UP,
     Eye,
+    Sides,
     camera_of,
     distance_to_fit,
     fly_through,
@@ -191,11 +192,17 @@ def film_rate(asset: Fraction, frames: int, wanted: float | None) -> Fraction:
     return asset if frames > 1 and asset >= OWN_RATE else FILM_RATE
 
 
+def room_within(good: Sides, start: float, most: Sides) -> Sides:
+    """Degrees to both sides of `start` that are good, of `most`; all of them where it begins beyond."""
+    low, high = start - good[0], good[1] - start
+    return most if min(low, high) < 0 else (min(most[0], low), min(most[1], high))
+
+
 def film_path(view: FilmedView | None, kind: Kind, start: Eye, count: int, sweep: float | None) -> list[Eye]:
-    """Where the camera is in each picture of a film: where the asset was filmed, but for a sweep that is asked for.
+    """Where the camera is in each picture of a film: where the asset is good, but for a sweep that is asked for.
 
     Args:
-        view: what was filmed, if that is known.
+        view: what was filmed and what of it is good, if that is known.
         count: pictures.
         sweep: degrees to each side, of a turntable; None for `WIDEST`, or as far as was filmed.
     """
@@ -203,6 +210,9 @@ def film_path(view: FilmedView | None, kind: Kind, start: Eye, count: int, sweep
     sides, heights = (sideways, sideways), (UP, UP)
     if view is not None:
         sides, heights = swing_filmed(view, start.azimuth, start.elevation, sideways, UP)
+        if view.good is not None:
+            sides = room_within(view.good.azimuth, start.azimuth, sides)
+            heights = room_within(view.good.elevation, start.elevation, heights)
     if kind is Kind.FLY:
         return fly_through(start, count, sides, heights)
     return turntable(start, count, sides if sweep is None else (sweep, sweep))

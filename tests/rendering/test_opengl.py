@@ -17,7 +17,7 @@ from PIL import Image
 from typer.testing import CliRunner
 
 from facefolds_core.asset import Asset
-from facefolds_core.asset.manifest_extras import FilmedView
+from facefolds_core.asset.manifest_extras import Directions, FilmedView
 from facefolds_core.cli import app
 from facefolds_core.cli.render import Kind, film_path, film_rate, parse_colour, parse_size, shrink
 from facefolds_core.errors import UserError
@@ -153,6 +153,10 @@ def test_films_stay_where_the_asset_was_filmed() -> None:
         azimuths, elevations = [eye.azimuth for eye in eyes], [eye.elevation for eye in eyes]
         assert (min(azimuths), max(azimuths)) == pytest.approx((-34, 24))
         assert min(elevations) >= -9 and max(elevations) <= 14
+    good = FILMED.model_copy(update={"good": Directions(azimuth=(-20, 15), elevation=(-2, 6))})
+    within = film_path(good, Kind.FLY, Eye(azimuth=5), 48, None)
+    assert (min(eye.azimuth for eye in within), max(eye.azimuth for eye in within)) == pytest.approx((-20, 15))
+    assert (min(eye.elevation for eye in within), max(eye.elevation for eye in within)) == pytest.approx((-2, 6))
     asked = film_path(FILMED, Kind.TURNTABLE, Eye(), 48, 90)
     assert max(eye.azimuth for eye in asked) == pytest.approx(90)
     behind = film_path(FILMED, Kind.TURNTABLE, Eye(azimuth=180), 48, None)  # asked for as well

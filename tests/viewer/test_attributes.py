@@ -88,6 +88,14 @@ def test_panning_and_double_clicks_move_what_is_looked_at(new_player: NewPlayer,
     assert numbers(player, "[e.player.view.goal.azimuth]")[0] < -5  # it turns instead
 
 
+def test_what_a_script_gives_is_an_attribute_too(new_player: NewPlayer, rich: Path) -> None:
+    player = new_player({"asset": rich}, viewport={"width": 400, "height": 300})
+    page_of_yours(player, "<facefolds-player></facefolds-player>")
+    player.run("await customElements.whenDefined('facefolds-player'); e.alt = 'Caps'; e.src = 'asset/'")
+    player.wait("e.ready")
+    assert player.run("return [e.src, e.getAttribute('alt'), e.loading]") == ["asset/", "Caps", "auto"]
+
+
 def test_a_page_says_when_it_is_revealed(new_player: NewPlayer, rich: Path) -> None:
     """Until then there is the asset's poster, and nothing else is fetched."""
     player = new_player({"asset": rich}, viewport={"width": 400, "height": 300})

@@ -69,7 +69,11 @@ def test_a_part_of_the_state_changes_that_part(opened: Opened, until: str) -> No
     view, home = player.run("return [e.state.view, e.player.view.home]")
     assert [view["azimuth"], view["elevation"]] == [40, 5]
     assert [view["distance"], view["target"]] == [pytest.approx(home["distance"]), pytest.approx(home["target"])]
-    assert player.run("try { e.state = {view: {azimuth: 'x'}} } catch (error) { return error.name }") == "TypeError"
+    before = player.run("return e.background")
+    for wrong in ("view: {azimuth: 'x'}", "mode: 'nonsense'"):
+        tried = f"try {{ e.state = {{background: '#123456', {wrong}}} }} catch (error) {{ return error.name }}"
+        assert player.run(tried) == "TypeError"
+    assert player.run("return e.background") == before
 
 
 def test_the_wheel_scrolls_the_page_until_the_player_is_meant(opened: Opened) -> None:

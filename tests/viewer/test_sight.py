@@ -138,6 +138,8 @@ def test_layers_that_are_pulled_apart_are_seen_from_aside_and_fill_the_canvas(
     assert found.min() > 0.03 and found.max() < 0.97
     assert np.ptp(found, axis=0).max() == pytest.approx(0.92, abs=0.01)  # of the width or the height: all but a margin
     assert found.min(0) + found.max(0) == pytest.approx([1, 1], abs=0.02)  # and in the middle
+    player.page.set_viewport_size({"width": size[1], "height": size[0]})  # a phone is turned
+    player.wait(f"Math.abs(e.player.view.get().azimuth - {28 + 62 - aside}) < 0.01")
     player.run("e.spread = 0")
     player.wait("Math.abs(e.player.view.get().azimuth) < 0.1")
 

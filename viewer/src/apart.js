@@ -12,11 +12,11 @@ export class Apart {
 
   /** Pulls the layers apart, and turns aside so that all are seen and fill the canvas; at 0 goes back. */
   pull(amount) {
-    const { view, renderer, size } = this.player;
+    const { view, renderer } = this.player;
     if (amount && !this.together) this.together = { orbit: view.get(), atHome: view.atHome };
     renderer.setSpread(amount);
     if (view.free !== amount > 0) view.setFree(amount > 0);
-    if (amount) view.frame(renderer.bounds(), size[0] > size[1] ? ASIDE : ACROSS);
+    if (amount) view.frame(renderer.bounds(), ([width, height]) => (width > height ? ASIDE : ACROSS));
     else if (this.together) {
       view.glide(this.together.orbit);
       view.atHome = this.together.atHome;

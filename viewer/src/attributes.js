@@ -12,7 +12,7 @@ export const OF_THE_VIEW = [...FIRST, ...ENDS, "auto-rotate", "disable-zoom", "d
 const PROPERTIES = {
   ...{ cameraOrbit: "", cameraTarget: "", fieldOfView: "", minCameraOrbit: "", maxCameraOrbit: "" },
   ...{ autoRotate: false, disableZoom: false, disablePan: false, disableTap: false },
-  ...{ exposure: 1, reveal: "auto" },
+  ...{ exposure: 1, reveal: "auto", src: "", alt: "", poster: "", loading: "auto" },
 };
 
 /**

@@ -16,6 +16,9 @@ import { watchSight, whenNear } from "./watch.js";
 
 const BACKGROUND = "#16181d";
 const SHADOW = 0.55; // on a backdrop
+const checkMode = (kind) => {
+  if (!KINDS.includes(kind)) throw new TypeError(`a mode is one of ${KINDS.join(", ")}, not "${kind}"`);
+};
 const PLAIN = { spread: 0, wireframe: false, effects: true, mode: "colour" };
 const FORWARDED = ["ready", "level", "frame", "play", "pause", "ended", "change", "camera-change", "error"];
 
@@ -284,7 +287,7 @@ export class FacefoldsPlayer extends PlayerApi {
   }
 
   set mode(kind) {
-    if (!KINDS.includes(kind)) throw new TypeError(`a mode is one of ${KINDS.join(", ")}, not "${kind}"`);
+    checkMode(kind);
     this.#set("mode", kind);
   }
 
@@ -324,6 +327,7 @@ export class FacefoldsPlayer extends PlayerApi {
     const { frame, view, level, hidden, photo, background } = state;
     if (view && !isOrbit(view))
       throw new TypeError("a view has azimuth and elevation in degrees, a distance above 0 and a target of 3 numbers");
+    if (state.mode !== undefined) checkMode(state.mode); // before anything is changed
     if (!this.ready) {
       this.#state = { ...this.#state, ...state, ...(view && { view: { ...this.#state.view, ...view } }) };
       return;

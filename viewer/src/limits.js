@@ -9,7 +9,7 @@
 const KEPT = 0.8; // of the range that was filmed
 const NEAR = 4; // degrees: so far from a camera, or from where all of them stood, a picture is as good
 const SOFT = 22; // degrees that a movement can be pushed beyond at most
-const FAINTEST = 0.06;
+const FAINTEST = 0.3; // still seen: who pushes on knows that nothing has broken
 const HEMS = { over: 4, from: 26, back: 100 }; // degrees: of the view until they have gone; beyond the outermost camera; at least
 const ROUND = 300; // degrees: cameras that go round so far have filmed from everywhere
 
@@ -67,7 +67,7 @@ export function resisted(value, range) {
   return inside + Math.sign(excess) * SOFT * (1 - Math.exp(-Math.abs(excess) / SOFT));
 }
 
-/** How strong the picture is: 1 within the range, nearly nothing at the furthest that one can push. */
+/** How strong the picture is: 1 within the range, FAINTEST at the furthest that one can push. */
 export function strength({ azimuth, elevation }, range) {
   const beyond = Math.max(
     Math.abs(azimuth - clamp(azimuth, range.azimuth)),

@@ -10,7 +10,7 @@ export function linkTo(element) {
 }
 
 /** Whether only this machine can reach an address: what `facefolds view` serves. */
-const isOwn = (address) => /^(localhost|127\..*|\[::1\])$/.test(new URL(address).hostname);
+export const isOwn = (address) => /^(localhost|127\..*|\[::1\])$/.test(new URL(address).hostname);
 
 /**
  * HTML for a page of somebody else's. An address of this machine would be of no use there: then for the player and the

@@ -10,6 +10,7 @@ const FILLED = 0.92; // of the free part of the canvas, by what there is; facefo
 const halfOf = (degrees) => Math.tan((degrees / 360) * Math.PI);
 const EASE = 0.07; // s in which most of a movement is done
 const DISTANCES = [0.2, 20];
+const FARTHEST = 3; // times the distance from where all is seen
 const FAINT = 0.9; // strength of the picture below which it is told why
 const LARGEST = 6; // pixels of the canvas that a texel takes when one has come as near as one can
 const SWAY = { degrees: 5, seconds: 9 }; // to each side; there and back
@@ -159,14 +160,16 @@ export class View {
   /**
    * Turns to a direction, from where the canvas holds all of a box and no more. Until somebody moves the view, it does so
    * again when the canvas changes.
-   * @param {{low: number[], high: number[]}} box @param {{azimuth: number, elevation: number}} direction
+   * @param {{low: number[], high: number[]}} box
+   * @param {(size: [number, number]) => {azimuth: number, elevation: number}} directionFor a canvas of that size
    */
-  frame({ low, high }, direction) {
+  frame({ low, high }, directionFor) {
+    const direction = directionFor(this.size);
     const [width, height] = this.#room();
     const slope = (this.half * FILLED) / this.#side();
     const { distance, target } = framing({ low, high }, direction, [slope * width, slope * height]);
     this.glide({ ...direction, distance, target });
-    this.framed = [{ low, high }, direction];
+    this.framed = [{ low, high }, directionFor];
   }
 
   reset() {
@@ -210,7 +213,8 @@ export class View {
     const nearest = Math.max(DISTANCES[0], Math.min(detailed, (this.home?.distance ?? Infinity) / 2));
     if (this.free) return [nearest, DISTANCES[1]];
     const [least, most] = this.allowed.map(({ distance, share }) => distance ?? share * this.whole); // NaN: as it is
-    return [Math.max(nearest, least || 0), Math.max(nearest, Math.min(DISTANCES[1], most || Infinity))];
+    const farthest = Math.max(FARTHEST * this.whole, this.home?.distance ?? 0);
+    return [Math.max(nearest, least || 0), Math.max(nearest, Math.min(most || farthest, DISTANCES[1]))];
   }
 
   /** Somebody has moved the view: it stays as it is from now on. */
@@ -253,6 +257,7 @@ export class View {
   /** The pointer is lifted: back to what was filmed. */
   rest() {
     this.pushed = null;
+    this.surface.dispatchEvent(new Event("rest"));
     this.#aim(this.goal);
     this.onChange();
   }

@@ -296,7 +296,8 @@ test("movements beyond the middle of what was filmed meet resistance, and fade",
   const [little, far] = [resisted(65, range.azimuth), resisted(500, range.azimuth)];
   assert.ok(little > 54 && little < 65 && far > little && far < 80);
   assert.equal(strength({ azimuth: 50, elevation: 0 }, range), 1);
-  assert.ok(strength({ azimuth: far, elevation: 0 }, range) < 0.1);
+  const faintest = strength({ azimuth: far, elevation: 0 }, range);
+  assert.ok(faintest > 0.25 && faintest < 0.35); // faded, not gone
   assert.equal(strength({ azimuth: 170, elevation: 60 }, bounded(null)), 1);
   assert.equal(bounded({ azimuth: [-170, 175], elevation: [0, 0] }).azimuth[1], Infinity); // filmed all round
   assert.equal(unwound(350, range.azimuth), -10);

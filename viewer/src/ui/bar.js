@@ -1,5 +1,5 @@
 /** The bar below: play, step, scrub, speed, loop, sound, compare, settings, share, full screen. */
-import { save, toClipboard } from "../sharing.js";
+import { isOwn, save, toClipboard } from "../sharing.js";
 import { ICONS } from "./template.js";
 
 /** @param {import("../element.js").FacefoldsPlayer} element */
@@ -114,7 +114,8 @@ async function immerse(element, kind) {
 async function share(element) {
   const { link } = element;
   // Without permission: to be copied by hand.
-  if (await toClipboard(link)) element.overlays.say("Link copied");
+  if (await toClipboard(link))
+    element.overlays.say(isOwn(link) ? "Link copied: it opens on this machine alone" : "Link copied");
   else element.overlays.say(link, 15000);
 }
 

@@ -9,6 +9,7 @@ import { connectKeys } from "./keys.js";
 import { connectPanel } from "./panel.js";
 
 const AGAIN = 1000; // ms without what a word is about, before it is said a second time
+const [HELD, AFTER] = [600000, 1500]; // ms of a word while, and after, somebody pushes against the limit
 const PROMPT = 3000; // ms until it is said what one can do
 const RATIO = 2; // pixels of the canvas for a CSS pixel, at most
 
@@ -57,7 +58,21 @@ function connectGesturesOf(element) {
     if (!element.hasAttribute("disable-tap") && element.ready)
       recentre(player, clipOf(player.canvas, clientX, clientY));
   });
-  tell("limit", "Cameras saw too little from further round");
+  tellLimit(element);
+}
+
+/** What fades is told as long as somebody pushes against it. */
+function tellLimit({ player, overlays }) {
+  let pushed = false;
+  const say = (milliseconds) => overlays.say("Cameras saw too little from further round", milliseconds);
+  player.canvas.addEventListener("limit", () => {
+    if (!pushed) say(HELD);
+    pushed = true;
+  });
+  player.canvas.addEventListener("rest", () => {
+    if (pushed) say(AFTER);
+    pushed = false;
+  });
 }
 
 /** Brings a place of the head to the middle; beside the head, the first view comes back. */
