@@ -107,7 +107,7 @@ GONE: dict[str, str] = {
     "bake.iterations": "textures fitted to the meshes were no better than the model's own",
     "compress.frame_rate_factor": "an asset has the capture's frames",
     "compress.video.lossless": "set `target_psnr`, or a low `crf`",
-    "compress.glb.draco": "the meshes of asset.glb are plain, which all programs read",
+    "compress.glb": "asset.glb shows frame 0; `load_asset(folder).save_glb(path, frame)` writes another",
     "compress.view_effects": "a reflection takes their place (`train.reflection`)",
     "evaluate.fresh_views": "set cameras aside instead: `subjects.NAME.holdout`",
 }

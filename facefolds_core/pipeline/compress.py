@@ -39,7 +39,7 @@ def compress(folders: SubjectFolders) -> str:
         params = needed(params, shown)
     manifest = package(folders.asset, export, scene, params)
     level = manifest.full
-    write_glb(folders.glb, read_level(folders.asset, level), scene.subject, params.glb.frame)
+    write_glb(folders.glb, read_level(folders.asset, level), scene.subject)
     mesh_bytes = sum(layer.bytes for layer in level.layers)
     videos = ", ".join(f"{video.codec} level {video.level}, {video.bytes} bytes" for video in level.texture.videos)
     quality = f", {level.quality.psnr_to_model:.1f} dB to what went in" if level.quality else ""
