@@ -9,8 +9,7 @@ from facefolds_core.asset.reader import read_level
 from facefolds_core.captures.scene import read_scene
 from facefolds_core.config.stages import read_stage
 from facefolds_core.export.choosing import explained
-from facefolds_core.export.steps import TEXTURES
-from facefolds_core.export.stores import read_meshes, read_places
+from facefolds_core.export.stores import TEXTURES, read_meshes, read_places
 from facefolds_core.files.frame_store import FrameStore
 from facefolds_core.files.paths import SubjectFolders
 from facefolds_core.packaging.notes import codec_warning
