@@ -8,6 +8,7 @@ from facefolds_core.asset.glb import write_glb
 from facefolds_core.asset.reader import read_level
 from facefolds_core.captures.scene import read_scene
 from facefolds_core.config.stages import read_stage
+from facefolds_core.errors import UserError
 from facefolds_core.export.choosing import explained
 from facefolds_core.export.stores import TEXTURES, read_meshes, read_places
 from facefolds_core.files.frame_store import FrameStore
@@ -20,10 +21,19 @@ from facefolds_core.params import CompressParams
 
 def compress(folders: SubjectFolders) -> str:
     params = read_stage(CompressParams, folders.config)
-    windows, chart, reflection, torso = read_places(folders.samples / "grids.npz")
+    places, meshes = folders.samples / "grids.npz", read_meshes(folders.meshes / "meshes.npz")
+    windows, chart, reflection, torso = read_places(places)
+    if len(windows) != len(meshes):
+        raise UserError(
+            "meshes and samples do not belong together",
+            file=places,
+            expected=f"{len(meshes)} windows",
+            found=len(windows),
+            remedy="run `dvc repro`, which makes both again",
+        )
     scene = read_scene(folders.scene).with_torso(torso)
     export = Export(
-        meshes=read_meshes(folders.meshes / "meshes.npz"),
+        meshes=meshes,
         windows=windows,
         textures=FrameStore(folders.textures / TEXTURES),
         centre=chart.centre,
