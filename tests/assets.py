@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from facefolds_core.asset import Asset, Manifest, read_asset
 from facefolds_core.asset.cropping import CroppedLayer, crop_layers
-from facefolds_core.asset.inputs import check_inputs
+from facefolds_core.asset.inputs import check_textures
 from facefolds_core.asset.manifest_file import MANIFEST_NAME, write_manifest
 from facefolds_core.asset.writer import FULL, AssetSource, LevelContent, manifest_of, write_level
 from facefolds_core.files.frame_store import FrameStore, write_frames
@@ -131,7 +131,7 @@ def write_asset(
     params: CompressParams,
 ) -> Manifest:
     """Write an asset of one level, as `package` does."""
-    frames = check_inputs(meshes, windows, textures)
+    frames = check_textures(textures, len(meshes))
     layers = crop_layers(meshes, windows, textures, frames)
     with atomic_folder(folder) as temporary:
         content = LevelContent(layers, textures, frames, source.fps)

@@ -26,7 +26,6 @@ from PIL import Image
 from facefolds_core.asset.opaque import faces_over, opaque_where_covered
 from facefolds_core.asset.packing import GUTTER
 from facefolds_core.asset.reader import AssetLevel
-from facefolds_core.errors import UserError
 from facefolds_core.files.writing import atomic_file
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.geometry.sphere_uv import st_to_uv
@@ -88,18 +87,7 @@ def write_glb(path: Path, level: AssetLevel, name: str, frame: int = 0) -> None:
 
     Args:
         name: of the root node.
-
-    Raises:
-        UserError: if there is no such frame.
     """
-    if not 0 <= frame < level.num_frames:
-        raise UserError(
-            "no such frame for the GLB",
-            place="compress.glb.frame",
-            expected=f"0 to {level.num_frames - 1}",
-            found=frame,
-            remedy="correct it in params.yaml",
-        )
     level = posed(level, frame)
     textures = opaque_where_covered(level.frame(frame), level.windows)
     builder = Builder()

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import itertools
+import json
 import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -15,11 +15,10 @@ from facefolds_core.cluster.dvc import THEN
 from facefolds_core.cluster.job import RUNNING, Job, Outcome
 from facefolds_core.cluster.lockfile import parts_of, put_together
 from facefolds_core.cluster.project import CODE
-from facefolds_core.config.params_file import Params
+from facefolds_core.config.params_file import Params, params_from
 from facefolds_core.errors import UserError
 from facefolds_core.files.parsing import brief, parse_yaml
 from facefolds_core.files.reading import read_text
-from facefolds_core.sweeps.edit import set_for_subject
 from facefolds_core.system.processes import own_environment
 
 BUSY = "is busy, it is being blocked by"
@@ -72,18 +71,37 @@ def sweep_jobs(
         UserError: if a key or value does not fit.
     """
     jobs: dict[Job, Mapping[str, Any]] = {}
-    text, locks = (root / "params.yaml").read_text(encoding="utf-8"), parts_of(root, subjects)
+    locks = parts_of(root, subjects)
     for subject in subjects:
+        links = links_of(params, root, subject)
         for number, cell in enumerate(cells):
-            with tempfile.TemporaryDirectory() as temporary:
-                changed = Path(temporary) / "params.yaml"
-                changed.write_text(text, encoding="utf-8")
-                set_for_subject(changed, subject, cell)
-                name = f"{subject}-{number:03d}"
-                new = changed.read_text(encoding="utf-8")
-            links = links_of(params, root, subject)
-            jobs[Job(name, subject, f"{stage}@{subject}", new, links, locks[subject])] = cell
+            new = with_values(root / "params.yaml", subject, cell)
+            jobs[Job(f"{subject}-{number:03d}", subject, f"{stage}@{subject}", new, links, locks[subject])] = cell
     return jobs
+
+
+def with_values(path: Path, subject: str, cell: Mapping[str, Any]) -> str:
+    """The text of a params.yaml with a cell's values as overrides of a subject that it has: JSON, which YAML holds.
+
+    Raises:
+        UserError: if a key or value does not fit.
+    """
+    tree = parse_yaml(read_text(path, "save it as UTF-8", expected="YAML"), path, "mend it")
+    tree = json.loads(json.dumps(tree))  # what aliases shared are values of their own then
+    for name, value in cell.items():
+        *folders, key = name.split(".")
+        place = tree["subjects"][subject]
+        for folder in folders:
+            if not isinstance(place.get(folder), dict):
+                place[folder] = {}
+            place = place[folder]
+        place[key] = value
+    try:
+        params_from(tree, path)
+    except UserError as error:
+        where: dict[str, Any] = {name: getattr(error, name) for name in ("place", "expected", "found", "remedy")}
+        raise UserError("a cell of the sweep does not fit into params.yaml", **where) from None
+    return json.dumps(tree, indent=2, ensure_ascii=False)
 
 
 def record(root: Path, outcomes: Sequence[Outcome], pull: bool, everybody: bool) -> tuple[list[str], str]:

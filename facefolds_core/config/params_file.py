@@ -65,7 +65,15 @@ def load_params(path: str | Path = "params.yaml") -> Params:
     path = Path(path)
     here = "run the command in the project's root folder, which has params.yaml"
     text = read_text(path, here if not is_there(path) else "save it as UTF-8", expected="YAML")
-    value = parse_yaml(text, path, "mend it; docs/guide/subjects.md describes the file")
+    return params_from(parse_yaml(text, path, "mend it; docs/guide/subjects.md describes the file"), path)
+
+
+def params_from(value: Any, path: Path) -> Params:
+    """What a params.yaml holds, checked; raises as `load_params` does.
+
+    Args:
+        path: for the message.
+    """
     if not isinstance(value, dict) or not isinstance(value.get("subjects"), dict) or not value["subjects"]:
         raise UserError(
             "no subjects",

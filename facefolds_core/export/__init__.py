@@ -1,1 +1,1 @@
-"""From a trained model to meshes and textures; the stages call `steps.py`."""
+"""From a trained model to meshes and textures: what the stages (pipeline/) call."""

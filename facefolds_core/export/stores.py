@@ -92,6 +92,9 @@ class Sheets:
         return len(self.radii)
 
 
+TEXTURES = "textures.arrow"
+"""Name of a frame store of textures, N layers x K frames, in its folder: they are many, and lie in no archive."""
+
 Arrays = dict[str, NDArray[Any]]
 Kinds = Mapping[str, tuple[type[np.generic], tuple[int | str, ...]]]
 """Name of an array -> its type and shape; a letter stands for one size wherever it stands."""

@@ -13,7 +13,7 @@ from PIL import Image
 from facefolds_core.asset.audio import encode_sound
 from facefolds_core.asset.cropping import crop_layers
 from facefolds_core.asset.filmed import filmed_view
-from facefolds_core.asset.inputs import check_inputs
+from facefolds_core.asset.inputs import check_textures
 from facefolds_core.asset.manifest import Level, Manifest, Reflection
 from facefolds_core.asset.manifest_extras import Audio, Photo, Poster
 from facefolds_core.asset.manifest_file import MANIFEST_NAME, write_manifest
@@ -48,7 +48,7 @@ class Export:
     """What the export's earlier stages made.
 
     Attributes:
-        meshes: N layers, outermost first.
+        meshes: N layers, outermost first, as `read_meshes` checked them.
         windows: of each layer's texture.
         textures: layered store, N layers x K frames of (R, R, 4).
         centre: c of the UV map, units.
@@ -71,7 +71,7 @@ def package(folder: Path, export: Export, scene: Scene, params: CompressParams) 
         UserError: if the export cannot be an asset.
     """
     _check_order(params.levels)
-    frames = check_inputs(export.meshes, export.windows, export.textures)
+    frames = check_textures(export.textures, len(export.meshes))
     source = AssetSource(scene.subject, scene.fps, scene.from_capture.inverse(), export.centre, scene.poses)
     cameras, textures = scene.views_of("train"), export.textures
     with atomic_folder(folder) as temporary:

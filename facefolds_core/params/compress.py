@@ -86,13 +86,6 @@ class StreamParams(Section):
     """Length of a segment, seconds: short ones seek faster, long ones are smaller."""
 
 
-class GlbParams(Section):
-    """The GLB beside the asset: one frame as binary glTF."""
-
-    frame: Natural = 0
-    """Index of the capture's frame whose textures it shows."""
-
-
 class LevelParams(Section):
     """A coarser level of detail, derived from the full one."""
 
@@ -132,9 +125,6 @@ class CompressParams(Section):
 
     stream: StreamParams = StreamParams()
     """Segments, DASH and HLS for long takes."""
-
-    glb: GlbParams = GlbParams()
-    """One frame for programs that read glTF."""
 
     attention: AttentionParams = AttentionParams()
     """Where the videos' bits go."""

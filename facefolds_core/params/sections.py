@@ -91,7 +91,7 @@ def user_error(
 
 
 def _unknown_key(kind: type[BaseModel], names: list[str]) -> tuple[str, str | None]:
-    """What is expected instead of an unknown key, and what to do about one that is no more, or of another model."""
+    """What is expected instead of an unknown key, and what to do about one that was replaced or is of another model."""
     *folders, key = names
     holder = kind
     for name in folders:

@@ -8,9 +8,9 @@ from facefolds_core.asset.glb import write_glb
 from facefolds_core.asset.reader import read_level
 from facefolds_core.captures.scene import read_scene
 from facefolds_core.config.stages import read_stage
+from facefolds_core.errors import UserError
 from facefolds_core.export.choosing import explained
-from facefolds_core.export.steps import TEXTURES
-from facefolds_core.export.stores import read_meshes, read_places
+from facefolds_core.export.stores import TEXTURES, read_meshes, read_places
 from facefolds_core.files.frame_store import FrameStore
 from facefolds_core.files.paths import SubjectFolders
 from facefolds_core.packaging.notes import codec_warning
@@ -21,10 +21,19 @@ from facefolds_core.params import CompressParams
 
 def compress(folders: SubjectFolders) -> str:
     params = read_stage(CompressParams, folders.config)
-    windows, chart, reflection, torso = read_places(folders.samples / "grids.npz")
+    places, meshes = folders.samples / "grids.npz", read_meshes(folders.meshes / "meshes.npz")
+    windows, chart, reflection, torso = read_places(places)
+    if len(windows) != len(meshes):
+        raise UserError(
+            "meshes and samples do not belong together",
+            file=places,
+            expected=f"{len(meshes)} windows",
+            found=len(windows),
+            remedy="run `dvc repro`, which makes both again",
+        )
     scene = read_scene(folders.scene).with_torso(torso)
     export = Export(
-        meshes=read_meshes(folders.meshes / "meshes.npz"),
+        meshes=meshes,
         windows=windows,
         textures=FrameStore(folders.textures / TEXTURES),
         centre=chart.centre,
@@ -39,7 +48,7 @@ def compress(folders: SubjectFolders) -> str:
         params = needed(params, shown)
     manifest = package(folders.asset, export, scene, params)
     level = manifest.full
-    write_glb(folders.glb, read_level(folders.asset, level), scene.subject, params.glb.frame)
+    write_glb(folders.glb, read_level(folders.asset, level), scene.subject)
     mesh_bytes = sum(layer.bytes for layer in level.layers)
     videos = ", ".join(f"{video.codec} level {video.level}, {video.bytes} bytes" for video in level.texture.videos)
     quality = f", {level.quality.psnr_to_model:.1f} dB to what went in" if level.quality else ""

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from facefolds_core.captures.scene import check_frames, read_scene
 from facefolds_core.config.stages import read_stage, read_train
-from facefolds_core.export.steps import SAMPLED_VIEWS, sample_model
-from facefolds_core.export.stores import write_grids
+from facefolds_core.export.sampling import sample_grids, samples_for, write_textures
+from facefolds_core.export.stores import TEXTURES, write_grids
+from facefolds_core.export.window import visible_window
 from facefolds_core.files.paths import SubjectFolders
 from facefolds_core.files.writing import atomic_folder
 from facefolds_core.model import load_model
 from facefolds_core.model.device import device_of
 from facefolds_core.params import SampleParams
+
+VIEWS = 3
+"""Frames of each training camera that the window is looked for in, where the head turns."""
 
 
 def sample(folders: SubjectFolders) -> str:
@@ -19,8 +25,11 @@ def sample(folders: SubjectFolders) -> str:
     scene = read_scene(folders.scene).with_torso(model.torso)
     check_frames("model", model.num_frames, scene)
     with atomic_folder(folders.samples) as temporary:
-        cameras = scene.views_of("train", SAMPLED_VIEWS)
-        grids = sample_model(model, cameras, params, temporary)
+        window = model.window if params.window != "auto" else visible_window(model, scene.views_of("train", VIEWS))
+        r = samples_for(model, window) if params.resolution == "auto" else params.resolution
+        grids = sample_grids(model, r, window)
+        opacity = write_textures(temporary / TEXTURES, model, grids)
+        grids = replace(grids, opacity=opacity, reflection=model.reflection_maps(), torso=model.torso)
         write_grids(temporary / "grids.npz", grids)
     u0, u1, v0, v1 = grids.windows[0]
     return (

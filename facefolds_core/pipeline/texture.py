@@ -6,9 +6,10 @@ import sys
 
 from facefolds_core.captures.scene import read_scene
 from facefolds_core.config.stages import read_stage
-from facefolds_core.export.steps import TEXTURES, texels_for
-from facefolds_core.export.stores import read_grids, read_meshes
+from facefolds_core.export.choosing import choose_texels
+from facefolds_core.export.stores import TEXTURES, read_grids, read_meshes
 from facefolds_core.export.textures import resample_store
+from facefolds_core.files.frame_store import FrameStore
 from facefolds_core.files.paths import SubjectFolders
 from facefolds_core.files.writing import atomic_folder
 from facefolds_core.params import TextureParams
@@ -18,7 +19,8 @@ from facefolds_core.pipeline.choices import write_choice
 def texture(folders: SubjectFolders) -> str:
     params, samples = read_stage(TextureParams, folders.config), folders.samples / TEXTURES
     meshes, grids = read_meshes(folders.meshes / "meshes.npz"), read_grids(folders.samples / "grids.npz")
-    size, chosen = texels_for(read_scene(folders.scene), meshes, grids, samples, params)
+    scene, given = read_scene(folders.scene), params.resolution
+    size, chosen = choose_texels(scene, meshes, grids, FrameStore(samples)) if given == "auto" else (given, None)
     with atomic_folder(folders.resampled) as temporary:
         source = resample_store(samples, temporary / TEXTURES, size)
         why = write_choice(temporary, chosen)

@@ -1,1 +1,1 @@
-"""Tables of DVC's experiments, and keys set for one subject."""
+"""Tables of experiments."""

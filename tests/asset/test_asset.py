@@ -11,7 +11,6 @@ import pytest
 from facefolds_core.asset import read_asset
 from facefolds_core.asset.validation import validate_asset
 from facefolds_core.errors import UserError
-from facefolds_core.geometry.meshes import TexturedMesh
 from tests.assets import PLAIN, SOURCE, WINDOW, cap_crops, cap_mesh, cap_textures, make_asset, write_asset, write_store
 
 
@@ -68,20 +67,8 @@ def test_static_scene(tmp_path: Path) -> None:
     assert (len(list(asset.frames())), len(asset.frame(0))) == (1, 3)
 
 
-def test_bad_meshes_and_incomplete_textures_are_refused(tmp_path: Path) -> None:
+def test_incomplete_textures_are_refused(tmp_path: Path) -> None:
     store = write_store(tmp_path / "textures.arrow", cap_textures(1, 0, 64)[None])
-    good = cap_mesh(0.4)
-    nan = good.vertices.copy()
-    nan[3, 1] = np.nan
-    bad = {
-        "not finite": TexturedMesh(nan, good.faces, good.st),
-        "outside": TexturedMesh(good.vertices, good.faces, good.st + np.float32(0.1)),
-        "not there": TexturedMesh(good.vertices, good.faces + 1, good.st),
-        "no faces": TexturedMesh(good.vertices, good.faces[:0], good.st),
-    }
-    for word, mesh in bad.items():
-        with pytest.raises(UserError, match=word):
-            write_asset(tmp_path / "asset", [mesh], [WINDOW], store, SOURCE, PLAIN)
     with pytest.raises(UserError, match="not complete"):
-        write_asset(tmp_path / "asset", [good] * 2, [WINDOW] * 2, store, SOURCE, PLAIN)
+        write_asset(tmp_path / "asset", [cap_mesh(0.4)] * 2, [WINDOW] * 2, store, SOURCE, PLAIN)
     assert not (tmp_path / "asset").exists()

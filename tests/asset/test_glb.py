@@ -14,7 +14,6 @@ from scipy.spatial.transform import Rotation
 from facefolds_core.asset import Asset
 from facefolds_core.asset.glb import write_glb
 from facefolds_core.asset.opaque import opaque_where_covered
-from facefolds_core.errors import UserError
 from facefolds_core.geometry.sphere_uv import uv_to_directions
 from facefolds_core.params import CompressParams, MeshCodec
 from tests.assets import CENTRE, make_asset
@@ -83,11 +82,6 @@ def test_the_subject_looks_to_z_with_y_up(written: Opened) -> None:
     document, _ = written
     turn = Rotation.from_quat(document["nodes"][document["scenes"][0]["nodes"][0]]["rotation"])
     np.testing.assert_allclose(turn.apply(np.eye(3)), [[0, 0, 1], [1, 0, 0], [0, 1, 0]], atol=1e-12)  # +x -> +z, ...
-
-
-def test_a_frame_that_is_not_there(asset: Asset, tmp_path: Path) -> None:
-    with pytest.raises(UserError, match="no such frame"):
-        write_glb(tmp_path / "a.glb", asset.full, "caps", frame=3)
 
 
 def test_the_shell_comes_from_within_and_from_the_back_without_backs(asset: Asset, written: Opened) -> None:

@@ -1,16 +1,18 @@
-"""Jobs: what they find where relative paths lead, what they lose to each other, what a killed DVC leaves."""
+"""Jobs: what a cell sets, where relative paths lead, what jobs lose to each other, what a killed DVC leaves."""
 
 from __future__ import annotations
 
 import os
+from datetime import date
 from pathlib import Path
 
 import pytest
 
 from facefolds_core.cluster.job import ATTEMPTS, repro
-from facefolds_core.cluster.jobs import links_of
+from facefolds_core.cluster.jobs import links_of, sweep_jobs
 from facefolds_core.cluster.project import drop_empty_runs
 from facefolds_core.config.params_file import load_params
+from facefolds_core.errors import UserError
 
 
 @pytest.mark.parametrize(
@@ -26,6 +28,47 @@ def test_captures_and_named_mattes_are_linked(tmp_path: Path, keys: str, linked:
     (tmp_path / "params.yaml").write_text(f"subjects:\n  anna: {{source: transforms, {keys}}}\n")
     links = links_of(load_params(tmp_path / "params.yaml"), tmp_path, "anna")
     assert links == tuple((one, str((tmp_path / one).resolve())) for one in linked)
+
+
+@pytest.fixture
+def project(tmp_path: Path) -> Path:
+    """Whose two subjects share a value."""
+    text = """
+subjects:
+  anna: {source: actor, path: a, compress: {video: &same {crf: 20, preset: fast}}} # with a comment
+  bert: {source: actor, path: b, compress: {video: *same}}
+"""
+    (tmp_path / "params.yaml").write_text(text)
+    return tmp_path
+
+
+def test_a_cells_values_are_overrides_of_its_subject_alone(project: Path, tmp_path: Path) -> None:
+    before = load_params(project / "params.yaml")
+    cell = {"compress.video.crf": 30, "decimate.resolution": 24, "train.textures.learning_rate": 2e-05}
+    (job,) = sweep_jobs(before, project, ["anna"], "evaluate", [cell])
+    assert (job.name, job.target) == ("anna-000", "evaluate@anna")
+    (tmp_path / "job.yaml").write_text(str(job.params))
+    after = load_params(tmp_path / "job.yaml")
+    own = {"textures": {"learning_rate": 2e-05}}
+    compress, decimate = {"video": {"crf": 30, "preset": "fast"}}, {"resolution": 24}
+    assert after.sections == before.sections and after.subjects["bert"] == before.subjects["bert"]
+    changed = {"compress": compress, "decimate": decimate, "train": own}
+    assert after.subjects["anna"] == before.subjects["anna"].model_copy(update=changed)
+
+
+@pytest.mark.parametrize(
+    ("subject", "values", "says"),
+    [
+        ("nobody", {"decimate.resolution": 24}, "no subject named"),
+        ("anna", {"decimate.resolution": 2}, r"(?s)a cell of the sweep .*decimate \(for subject anna\).*auto"),
+        ("anna", {"decimate.colour": 2}, "(?s)a cell of the sweep .*a key: resolution, uv"),
+        ("anna", {"decimate": date(2026, 1, 1)}, "(?s)a cell of the sweep .*subjects.anna.decimate"),
+        ("anna", {"train.lr_texture": 2}, "(?s)a cell of the sweep .*it is called `textures.learning_rate` now"),
+    ],
+)
+def test_a_cell_that_does_not_fit_is_refused(subject: str, values: dict[str, object], says: str, project: Path) -> None:
+    with pytest.raises(UserError, match=says):
+        sweep_jobs(load_params(project / "params.yaml"), project, [subject], "evaluate", [values])
 
 
 LOST = "ERROR: failed to reproduce 'configure': [Errno 2] No such file: '/p/.dvc/cache/runs/47/475c/.4sh.tmp'\n"

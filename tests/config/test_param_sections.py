@@ -22,7 +22,7 @@ from facefolds_core.params import (
     section_of,
     train_params,
 )
-from facefolds_core.params.renamed import GONE, GONE_SECTIONS, RENAMED, remedy_for
+from facefolds_core.params.renamed import RENAMED, REPLACED, remedy_for
 
 OLD = {old.partition(".")[2] for old in RENAMED}
 
@@ -112,20 +112,14 @@ def test_a_renamed_key_names_the_new_one_which_exists(old: str, new: str) -> Non
     assert dict(leaves(train_params(nested(path, 0.01))))[path] == 0.01
 
 
-@pytest.mark.parametrize("path", [*GONE, *(f"{section}.key" for section in GONE_SECTIONS)])
-def test_a_key_that_is_no_more_is_refused_with_what_took_its_place(path: str) -> None:
-    old = path.removesuffix(".key")
+@pytest.mark.parametrize("path", REPLACED)
+def test_a_replaced_key_is_refused_with_what_took_its_place(path: str) -> None:
     stage, _, key = path.partition(".")
-    if stage not in SECTIONS:
-        assert stage in GONE_SECTIONS and GONE[stage] in str(remedy_for(stage))
-        return
-    models = ({"preset": preset} for preset in ("fast", "paper")) if stage == "train" else iter([{}])
-    remedies = []
-    for given in models:
+    assert REPLACED[path] in str(remedy_for(path))
+    if stage in SECTIONS:
         with pytest.raises(UserError) as caught:
-            section_of(stage, {**given, **nested(key, 1)})
-        remedies.append(str(caught.value.remedy))
-    assert any(GONE[old] in remedy for remedy in remedies), remedies
+            section_of(stage, nested(key, 1))
+        assert caught.value.remedy == remedy_for(path)
 
 
 def test_an_unknown_key_of_a_nested_section_lists_those_there_are() -> None:

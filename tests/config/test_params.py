@@ -81,7 +81,6 @@ def test_a_change_of_one_section_changes_one_file_only(tmp_path: Path) -> None:
         (MINIMAL + "train: {preset: fastest}\n", "there are"),
         (MINIMAL + "train: {preset: [fast]}\n", "there are"),
         (MINIMAL + "train: fast\n", "keys and values"),
-        (MINIMAL + "train: {lambda_veil: 0}\n", "no background is learnt"),
         ("subjects:\n  a: {source: actor, path: x, mattes: ~/mine}\n", "subjects.a.mattes"),
         (
             "subjects:\n  a: {source: actor, path: x, train: {preset: paper}}\ntrain: {geometry: {}}\n",

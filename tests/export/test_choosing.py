@@ -12,19 +12,20 @@ from numpy.typing import NDArray
 from facefolds_core.asset import packing
 from facefolds_core.asset.packing import AtlasLayout
 from facefolds_core.captures.scene import Scene
-from facefolds_core.export import choosing, steps
+from facefolds_core.export import choosing
 from facefolds_core.export.choosing import choose_meshes, choose_texels, explained, looks_of
 from facefolds_core.export.poisson import gather_samples, reconstruct
 from facefolds_core.export.sampling import sample_grids
 from facefolds_core.export.sheets import grid_sheets
-from facefolds_core.export.stores import Grids
+from facefolds_core.export.stores import Grids, Sheets
 from facefolds_core.facts import Fact, fact
 from facefolds_core.files.frame_store import FrameStore, write_frames
 from facefolds_core.files.writing import read_json
 from facefolds_core.geometry.chart import Chart
-from facefolds_core.geometry.meshes import TexturedMesh
+from facefolds_core.geometry.meshes import Surface, TexturedMesh
 from facefolds_core.geometry.reflections import ReflectionMaps
-from facefolds_core.params import DecimateParams, ReconstructParams, TextureParams
+from facefolds_core.params import DecimateParams, ReconstructParams
+from facefolds_core.pipeline import decimate
 from facefolds_core.pipeline.choices import write_choice
 from facefolds_core.rendering.raster import cast_layers
 from facefolds_core.rendering.reference import composite
@@ -54,7 +55,7 @@ def stripes(period: float) -> NDArray[np.uint8]:
     return image
 
 
-def surfaces(grids: Grids, method: str) -> steps.Surfaces:
+def surfaces(grids: Grids, method: str) -> Sheets | list[Surface]:
     """Those of `reconstruct`; Poisson's one after the other, as processes of their own take seconds to begin."""
     if method == "grid":
         return grid_sheets(grids, None)
@@ -98,7 +99,6 @@ def small(monkeypatch: pytest.MonkeyPatch) -> None:
     """Candidates as small as the pictures here."""
     monkeypatch.setattr(choosing, "TEXELS", (16, 32, 48, 64))
     monkeypatch.setattr(choosing, "MESHES", (8, 16, 32, 64))
-    monkeypatch.setattr(steps, "MESHES", (8, 16, 32, 64))
 
 
 @pytest.mark.parametrize("period, least", [(32.0, 32), (16.0, 48), (5.0, 64)])
@@ -168,12 +168,6 @@ def test_cameras_for_validation_decide_where_there_are_any(tmp_path: Path, monke
     assert split == "validate" and [camera.name for (camera, _), _ in looks] == ["cam1"]
 
 
-def test_numbers_fix_both(tmp_path: Path) -> None:
-    filmed = film(tmp_path, 32.0)
-    size, why = steps.texels_for(filmed.scene, [ball(8)], matte(), filmed.textures.path, TextureParams(resolution=40))
-    assert (size, why) == (40, None)
-
-
 @pytest.mark.parametrize("method", ["grid", "poisson"])
 def test_coarser_levels_are_never_finer_than_the_full_one(
     tmp_path: Path, method: str, monkeypatch: pytest.MonkeyPatch
@@ -183,10 +177,9 @@ def test_coarser_levels_are_never_finer_than_the_full_one(
     write_frames(tmp_path / "samples.arrow", (8, 8, 4), [(n, 0, np.full((8, 8, 4), 255, np.uint8)) for n in range(2)])
     for name, value in {"MESHES": (8, 16), "LOSS": 50.0, "FIDELITY": 0.0}.items():
         monkeypatch.setattr(choosing, name, value)
-    monkeypatch.setattr(steps, "MESHES", (8, 16))
-    meshes, coarser, why = steps.decimate_all(
-        surfaces(grids, method), grids, scene, tmp_path / "samples.arrow", DecimateParams(), [6, 12]
-    )
+    monkeypatch.setattr(decimate, "MESHES", (8, 16))
+    samples, found = FrameStore(tmp_path / "samples.arrow"), surfaces(grids, method)
+    meshes, coarser, why = decimate.decimate_all(found, grids, scene, samples, DecimateParams(), [6, 12])
     assert why is not None and why.values["chosen"] == 8
     assert len(meshes[0].vertices) <= 64
     assert coarser[12] is meshes and len(coarser[6][0].vertices) <= 36

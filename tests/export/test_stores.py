@@ -111,7 +111,9 @@ WRONG: list[tuple[str, dict[str, Any], str]] = [
     ("sheets", {"radii": np.array([1, 2], np.float32)[:, None, None] * np.ones((8, 8), np.float32)}, "radii"),
     ("sheets", {"st": np.full((8, 8, 2), np.inf)}, "st"),
     ("sheets", {"falling": np.ones((8, 8), bool)}, "falling"),
+    ("meshes", {"vertices": np.full((3, 3), np.nan, np.float32)}, "vertices_00"),
     ("meshes", {"faces": np.array([[0, 1, 3]], np.int32)}, "faces_00"),
+    ("meshes", {"faces": np.zeros((0, 3), np.int32)}, "faces_00"),
     ("meshes", {"st": np.array([[0, 0], [0.5, 1], [1.5, 0]], np.float32)}, "st_00"),
     ("meshes", {"st": np.zeros((2, 2), np.float32)}, "st_00"),
 ]

@@ -1,6 +1,5 @@
 /** manifest.json, format version 4 (docs/reference/asset-format.md): read, checked as far as the player relies on it. */
 import { PlayerError } from "./errors.js";
-import { broughtUp } from "./older.js";
 import { matrixOf, POSE_BYTES } from "./track.js";
 
 export const VERSION = 4;
@@ -23,7 +22,7 @@ const PLAIN_NAME = /^[A-Za-z0-9_][A-Za-z0-9_.-]*$/;
  * @typedef {{subject: string, generator: string, centre: number[], levels: Level[], audio: FileEntry & {mime: string} | null,
  *   poster: FileEntry | null, photos: Photo[], view: import("./limits.js").Filmed | null,
  *   track: import("./track.js").Pose[] | null, trackFile: FileEntry | null,
- *   torso: import("./track.js").Torso | null}} Manifest `track`: of version 3
+ *   torso: import("./track.js").Torso | null}} Manifest `track`: of its file, once that is read
  */
 
 /**
@@ -47,9 +46,9 @@ export function parseManifest(text, file) {
     });
   }
   const newer = Number(value.version) > VERSION;
-  if (newer ? !(value.minVersion <= VERSION) : ![1, 2, 3, VERSION].includes(value.version)) {
+  if (newer ? !(value.minVersion <= VERSION) : value.version !== VERSION) {
     throw new PlayerError(
-      `The asset has format version ${value.version}; this player reads versions 1 to ${VERSION}${newer ? " and is too old for it" : ""}`,
+      `The asset has format version ${value.version}; this player reads version ${VERSION}${newer ? " and is too old for it" : ""}`,
       {
         file,
         kind: "unsupported",
@@ -70,7 +69,7 @@ export function parseManifest(text, file) {
     );
   }
   try {
-    return readManifest(value.version < 3 ? broughtUp(value) : value);
+    return readManifest(value);
   } catch (cause) {
     if (cause instanceof TypeError || cause instanceof RangeError) throw damaged(file, cause.message, cause);
     throw cause;
@@ -100,7 +99,7 @@ function readManifest(value) {
     bounds: value.bounds ? readBounds(value.bounds) : null,
     photos: (value.photos ?? []).map(readPhoto),
     trackFile: value.track_file ? readTrackFile(value.track_file, levels[0].texture.frames) : null,
-    track: value.track ? readTrack(value.track, levels[0].texture.frames) : null,
+    track: null,
     torso: value.torso ? readTorso(value.torso) : null,
     view: value.view ? { ...directions(value.view), good: value.view.good ? directions(value.view.good) : null } : null,
   };
@@ -255,15 +254,6 @@ function readTorso({ normal, offset, band, quaternion, translation }) {
     "torso is no plane",
   );
   return { normal, offset, band, rest: matrixOf({ quaternion, translation }) };
-}
-
-function readTrack(value, frames) {
-  check(list(value, "track").length === frames, `track has ${value.length} poses for ${frames} frames`);
-  return value.map(({ quaternion, translation }, i) => {
-    const numbers = [...list(quaternion, `track[${i}].quaternion`), ...list(translation, `track[${i}].translation`)];
-    check(numbers.length === 7 && numbers.every(Number.isFinite), `track[${i}] is no pose`);
-    return { quaternion, translation };
-  });
 }
 
 const directions = (view) => ({ azimuth: range(view, "azimuth"), elevation: range(view, "elevation") });

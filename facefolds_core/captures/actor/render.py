@@ -52,7 +52,6 @@ class ActorOptions:
     Attributes:
         gloss: factor on all gloss; 0 makes the head view-independent.
         hair_density: factor on the hair's extinction; 0 makes it bald.
-        room_colour: 1 as painted, 0 a grey room.
         head_motion: amplitude of a rigid turn and nod, radians; 0 keeps the skull still.
         clutter: 0 the room as painted, 1 tiles of random colours all over it.
         nose: mm by which the nose is longer.
@@ -63,7 +62,6 @@ class ActorOptions:
 
     gloss: float = 1.0
     hair_density: float = 1.0
-    room_colour: float = 1.0
     head_motion: float = 0.0
     clutter: float = 0.0
     nose: float = 0.0
@@ -150,7 +148,7 @@ def _sample(
         starts: distances along the ray before which there is no surface, and no hair.
     """
     w, o, d, length = _ray(u, v, to_world, centre, frame)
-    gloss, amount, colourfulness, clutter = settings[0], settings[1], settings[2], settings[3]
+    gloss, amount, clutter = settings[0], settings[1], settings[2]
     hit = math.inf
     if starts[0] < math.inf:
         _, far = span(o, d, AROUND, RADIUS, 0.0)
@@ -166,7 +164,7 @@ def _sample(
         n = normal(p[0], p[1], p[2], pose)
         r, g, bl = surface_colour(p, n, (-d[0], -d[1], -d[2]), material, pose, lights, gloss)
         return red + through * r, green + through * g, blue + through * bl, 1.0, hit / length
-    r, g, bl = room_colour((centre[0], centre[1], centre[2]), w, colourfulness, clutter)
+    r, g, bl = room_colour((centre[0], centre[1], centre[2]), w, clutter)
     return red + through * r, green + through * g, blue + through * bl, 1.0 - through, math.inf
 
 
@@ -248,7 +246,7 @@ def render(camera: Camera, time: float, options: ActorOptions | None = None) -> 
     lights = _LIGHTS.copy()
     lights[:, :3] = _LIGHTS[:, :3] @ np.diag([1.0, -1.0, -1.0]) @ rotation
     to_world = np.ascontiguousarray(camera.rotation.T @ np.linalg.inv(camera.K))
-    settings = np.array([options.gloss, options.hair_density, options.room_colour, options.clutter])
+    settings = np.array([options.gloss, options.hair_density, options.clutter])
     rgb, opacity, depth = _render_samples(
         camera.height,
         camera.width,

@@ -105,13 +105,12 @@ def _ceiling(u: float, v: float) -> Vector:
 
 
 @compiled
-def room_colour(o: Vector, d: Vector, colourfulness: float, clutter: float) -> Vector:
+def room_colour(o: Vector, d: Vector, clutter: float) -> Vector:
     """Colour of the wall that a ray meets from inside the room.
 
     Args:
         o: origin, world mm.
         d: direction.
-        colourfulness: 1 as painted, 0 grey.
         clutter: 0 as painted, 1 hung with tiles of random colours.
     """
     (ox, oy, oz), (dx, dy, dz) = o, d
@@ -134,6 +133,5 @@ def room_colour(o: Vector, d: Vector, colourfulness: float, clutter: float) -> V
     gap_x, gap_y, gap_z = min(x - _LEFT, _RIGHT - x), min(y - _CEILING, _FLOOR - y), min(z - _FRONT, _BACK - z)
     middle = gap_x + gap_y + gap_z - min(gap_x, gap_y, gap_z) - max(gap_x, gap_y, gap_z)
     light = 0.62 + 0.3 * smoothstep(0.0, 700.0, middle)
-    grey = 0.30 * colour[0] + 0.59 * colour[1] + 0.11 * colour[2]
-    red, green, blue = mix((grey, grey, grey), colour, colourfulness)
+    red, green, blue = colour
     return clamp(red * light, 0.0, 1.0), clamp(green * light, 0.0, 1.0), clamp(blue * light, 0.0, 1.0)
