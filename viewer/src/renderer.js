@@ -13,7 +13,7 @@ import { drawBackdrop, drawShadow, fillBackdrop } from "./ground.js";
 import { eyeOf, IDENTITY, inverseOf, multiplied, transformed } from "./matrices.js";
 import { COLOUR_FRAGMENT, DEPTH_FRAGMENT, KINDS, VERTEX, WIRE_FRAGMENT } from "./shaders.js";
 
-const SPREAD = { step: 0.6, all: 5.5 }; // heights of the head from layer to layer when fully pulled apart, and at most in all
+const SPREAD = { step: 0.6, all: 3.2 }; // heights of the head from layer to layer when fully pulled apart, and at most in all
 const LOOK = 96; // pixels a side of the picture that the range of depths is taken from
 
 export class LayerRenderer {
