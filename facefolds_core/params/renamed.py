@@ -103,6 +103,7 @@ GONE: dict[str, str] = {
     "train.lambda_veil": CUT_OUT,
     "train.lambda_solid": CUT_OUT,
     "train.lr_volume": GAUSSIANS,
+    "train.textures.full_rate_iterations": "steps beyond it are as large as others; a lower `iterations` takes fewer",
     "train.textures.frame_decay": "what a frame has of its own does not decay",
     "bake.iterations": "textures fitted to the meshes were no better than the model's own",
     "compress.frame_rate_factor": "an asset has the capture's frames",
