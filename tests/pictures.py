@@ -6,14 +6,14 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from facefolds_core.asset import Asset
 from facefolds_core.asset.reader import AssetLevel
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.rendering.areas import AreaView
 from facefolds_core.rendering.raster import cast_layers
-from facefolds_core.rendering.reference import AssetCaster, composite, room_from, seen_from
+from facefolds_core.rendering.reference import BLACK, AssetCaster, Layered, composite, room_from, seen_from
 from facefolds_core.rendering.reflection import reflected_colours
 from tests.scenes import look_at_origin
 
@@ -35,6 +35,13 @@ def turned_cameras(size: int) -> list[Camera]:
 def psnr(found: NDArray[Any], expected: NDArray[Any]) -> float:
     error = float(np.mean((np.asarray(found, np.float64) - expected) ** 2))
     return float(-10 * np.log10(max(error, 1e-12)))
+
+
+def render_asset(
+    asset: Layered, camera: Camera, frame: int, background: ArrayLike = BLACK
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """One ray a pixel: rgb (H, W, 3) and alpha (H, W) of a frame; a head with a track stands as it did then."""
+    return composite(AssetCaster(asset, frame).cast(seen_from(asset, camera, frame)), asset.frame(frame), background)
 
 
 def expected_pictures(
