@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -45,27 +46,19 @@ def render_asset(
 
 
 def expected_pictures(
-    asset: Asset | AssetLevel, cameras: Sequence[Camera], frames: Sequence[int]
+    asset: Asset | AssetLevel, cameras: Sequence[Camera], frames: Sequence[int], means: bool = False
 ) -> dict[tuple[str, int], NDArray[np.float32]]:
-    """One ray a pixel, over grey, the head at rest: by camera's name and frame (H, W, 3) in [0, 1]."""
+    """One ray a pixel, or means over pixels, over grey, the head at rest: by camera's name and frame (H, W, 3) in
+    [0, 1]."""
     caster = AssetCaster(asset)
-    hits = {camera.name: caster.cast(camera) for camera in cameras}
-    return {
-        (name, frame): composite(hit, textures, (GREY_VALUE,) * 3)[0]
-        for frame, textures in [(frame, asset.frame(frame)) for frame in frames]
-        for name, hit in hits.items()
+    looks = {
+        camera.name: _view_at_rest(asset, camera).composite if means else partial(composite, caster.cast(camera))
+        for camera in cameras
     }
-
-
-def expected_means(
-    asset: Asset | AssetLevel, cameras: Sequence[Camera], frames: Sequence[int]
-) -> dict[tuple[str, int], NDArray[np.float32]]:
-    """The same as means over pixels."""
-    views = {camera.name: _view_at_rest(asset, camera) for camera in cameras}
     return {
-        (name, frame): view.composite(textures, (GREY_VALUE,) * 3)[0]
+        (name, frame): look(textures, (GREY_VALUE,) * 3)[0]
         for frame, textures in [(frame, asset.frame(frame)) for frame in frames]
-        for name, view in views.items()
+        for name, look in looks.items()
     }
 
 
@@ -85,7 +78,7 @@ def lit_picture(
 
 
 def means_of_frames(asset: Asset | AssetLevel, camera: Camera) -> list[NDArray[np.float32]]:
-    """The same of all frames, by one camera."""
+    """Means over pixels of all frames, by one camera."""
     view = _view_at_rest(asset, camera)
     return [view.composite(textures, (GREY_VALUE,) * 3)[0] for textures in asset.frames()]
 

@@ -17,6 +17,7 @@ from playwright.sync_api import FloatRect, Page, Route
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.serving.server import serving
 from facefolds_core.system.locks import holding
+from tests.pictures import GREY
 from tests.viewer.captured import captured
 
 PATIENCE = 60_000
@@ -225,3 +226,15 @@ def show(new_player: NewPlayer, rich: Path) -> Show:
         return player
 
     return shown
+
+
+@pytest.fixture
+def opened(show: Show) -> Show:
+    """`show` at its full level, on grey, without the reflection."""
+
+    def of(**options: object) -> Player:
+        player = show(full=True, **options)
+        player.run("e.background = v; e.effects = false", GREY)
+        return player
+
+    return of
