@@ -24,7 +24,7 @@ from facefolds_core.asset.reader import AssetLevel
 from facefolds_core.asset.validation import validate_asset
 from facefolds_core.rendering.reference import AssetCaster, composite
 from tests.hostile.damage import MUTATIONS, Counts, Outcome, fingerprint, outcome
-from tests.hostile.structured import ODD
+from tests.hostile.structured import ODD, damage_bytes
 from tests.hostile.watch import within
 from tests.scenes import look_at_origin
 from tests.viewer.fixtures import rich_asset
@@ -102,11 +102,9 @@ def names(place: Path) -> list[str]:
 
 def damage_file(place: Path, random: np.random.Generator) -> Damage:
     """Other bytes; the checksums stay."""
-    name, mutation = random.choice(names(place)), MUTATIONS[random.integers(len(MUTATIONS))]
-    content = (place / name).read_bytes()
-    damaged = mutation(content, random)
-    (place / name).write_bytes(damaged)
-    return f"{mutation.__name__} {name}", damaged != content
+    path = place / random.choice(names(place))
+    content = path.read_bytes()
+    return f"{damage_bytes(path, random)} {path.name}", path.read_bytes() != content
 
 
 def replace_file(place: Path, random: np.random.Generator) -> Damage:
