@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from facefolds_core.asset import Asset
 from facefolds_core.asset.reader import AssetLevel
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.rendering.areas import AreaView
 from facefolds_core.rendering.raster import cast_layers
-from facefolds_core.rendering.reference import AssetCaster, composite, room_from, seen_from
+from facefolds_core.rendering.reference import BLACK, AssetCaster, Layered, composite, room_from, seen_from
 from facefolds_core.rendering.reflection import reflected_colours
 from tests.scenes import look_at_origin
 
@@ -37,28 +38,27 @@ def psnr(found: NDArray[Any], expected: NDArray[Any]) -> float:
     return float(-10 * np.log10(max(error, 1e-12)))
 
 
+def render_asset(
+    asset: Layered, camera: Camera, frame: int, background: ArrayLike = BLACK
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """One ray a pixel: rgb (H, W, 3) and alpha (H, W) of a frame; a head with a track stands as it did then."""
+    return composite(AssetCaster(asset, frame).cast(seen_from(asset, camera, frame)), asset.frame(frame), background)
+
+
 def expected_pictures(
-    asset: Asset | AssetLevel, cameras: Sequence[Camera], frames: Sequence[int]
+    asset: Asset | AssetLevel, cameras: Sequence[Camera], frames: Sequence[int], means: bool = False
 ) -> dict[tuple[str, int], NDArray[np.float32]]:
-    """One ray a pixel, over grey, the head at rest: by camera's name and frame (H, W, 3) in [0, 1]."""
+    """One ray a pixel, or means over pixels, over grey, the head at rest: by camera's name and frame (H, W, 3) in
+    [0, 1]."""
     caster = AssetCaster(asset)
-    hits = {camera.name: caster.cast(camera) for camera in cameras}
-    return {
-        (name, frame): composite(hit, textures, (GREY_VALUE,) * 3)[0]
-        for frame, textures in [(frame, asset.frame(frame)) for frame in frames]
-        for name, hit in hits.items()
+    looks = {
+        camera.name: _view_at_rest(asset, camera).composite if means else partial(composite, caster.cast(camera))
+        for camera in cameras
     }
-
-
-def expected_means(
-    asset: Asset | AssetLevel, cameras: Sequence[Camera], frames: Sequence[int]
-) -> dict[tuple[str, int], NDArray[np.float32]]:
-    """The same as means over pixels."""
-    views = {camera.name: _view_at_rest(asset, camera) for camera in cameras}
     return {
-        (name, frame): view.composite(textures, (GREY_VALUE,) * 3)[0]
+        (name, frame): look(textures, (GREY_VALUE,) * 3)[0]
         for frame, textures in [(frame, asset.frame(frame)) for frame in frames]
-        for name, view in views.items()
+        for name, look in looks.items()
     }
 
 
@@ -78,7 +78,7 @@ def lit_picture(
 
 
 def means_of_frames(asset: Asset | AssetLevel, camera: Camera) -> list[NDArray[np.float32]]:
-    """The same of all frames, by one camera."""
+    """Means over pixels of all frames, by one camera."""
     view = _view_at_rest(asset, camera)
     return [view.composite(textures, (GREY_VALUE,) * 3)[0] for textures in asset.frames()]
 

@@ -40,8 +40,8 @@ from facefolds_core.geometry.track import Track
 from facefolds_core.packaging.levels import Resampled, write_rungs
 from facefolds_core.params import CompressParams, LevelParams, MeshCodec, StreamParams, VideoCodec
 from facefolds_core.rendering.pixels import render
-from facefolds_core.rendering.reference import render_asset
 from tests.assets import grid_faces
+from tests.pictures import render_asset
 from tests.scenes import view_of
 
 ASSETS = ("short", "stream")

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import torch
 from torch import Tensor, nn
 from torch.nn.functional import grid_sample
@@ -95,37 +93,24 @@ class GridTextures(nn.Module):
         return Shaded(rgba[:, :3], rgba[:, 3], None)
 
     def shade(self, uv: Tensor, layer: Tensor, time: Tensor, directions: Tensor | None) -> Shaded:
-        """Points at uv [P, 2] of layers [P] at frame times [P]; the view term is the reflection's [P, 3]."""
+        """Points at uv [P, 2] of layers [P] at frame times [P]; the view term is the reflection's [P, 3].
+
+        Images of all layers are made for each time that occurs, which are few: a picture has one.
+        """
         height, width = self.shape
         st = uv_to_st(uv, self.window)
         x = (st[:, 0] * width - 0.5).clamp(0, width - 1)
         y = (st[:, 1] * height - 0.5).clamp(0, height - 1)
         j, i = x.floor().clamp(max=max(width - 2, 0)).long(), y.floor().clamp(max=max(height - 2, 0)).long()
         b, a = (x - j)[:, None], (y - i)[:, None]
-        look_up = self._look_up(layer, time)
+        times, which = time.unique(return_inverse=True)
+        images = [self.image(n, at) for at in times.tolist() for n in range(self.layers.shape[2])]
+        texels = torch.stack(images) if images else self.layers.new_zeros(1, height, width, 4)
+        number = which * self.layers.shape[2] + layer
         rgba = torch.zeros_like(b)
         for di, wi in ((0, 1 - a), (1, a)):
             for dj, wj in ((0, 1 - b), (1, b)):
-                rgba = rgba + wi * wj * look_up((i + di).clamp(max=height - 1), (j + dj).clamp(max=width - 1))
+                texel = texels[number, (i + di).clamp(max=height - 1), (j + dj).clamp(max=width - 1)]
+                rgba = rgba + wi * wj * texel
         seen = None if directions is None or self.reflection is None else self.reflection.added(st, directions)
         return Shaded(rgba[:, :3], rgba[:, 3], seen)
-
-    def _look_up(self, layer: Tensor, time: Tensor) -> Callable[[Tensor, Tensor], Tensor]:
-        """Function of texel rows and columns [P] -> RGBA [P, 4], for points of layers [P] at times [P]."""
-        if len(time) and bool((time == time[0]).all()):
-            # One time for all, as in rendering: make the images once and gather from them.
-            images = torch.stack([self.image(n, float(time[0])) for n in range(self.layers.shape[2])])
-            return lambda i, j: images[layer, i, j]
-        time = time.clamp(0, self.num_frames - 1)
-        before = time.floor().long()
-        after = (before + 1).clamp(max=self.num_frames - 1)
-        fraction = time - before
-
-        def texel(i: Tensor, j: Tensor) -> Tensor:
-            own = self.layers[i, j, layer]
-            moving = torch.lerp(self.frame_colour[before, i, j], self.frame_colour[after, i, j], fraction[:, None])
-            fading = torch.lerp(self.frame_alpha[before, i, j, layer], self.frame_alpha[after, i, j, layer], fraction)
-            rgb = (self.colour[i, j] + own[:, :3] + moving).clamp(0, 1)
-            return torch.cat([rgb, torch.sigmoid(own[:, 3] + fading)[:, None]], 1)
-
-        return texel

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import Protocol
 
 import torch
 from torch import Tensor, nn
@@ -11,61 +10,12 @@ from torch.nn.functional import silu
 
 from facefolds_core.geometry.chart import Chart
 from facefolds_core.geometry.similarity import Similarity
-from facefolds_core.geometry.sphere_uv import FULL_WINDOW, Window, uv_to_directions
-from facefolds_core.geometry.torso import Torso
+from facefolds_core.geometry.sphere_uv import FULL_WINDOW, uv_to_directions
 from facefolds_core.model.intersection import Crossings, first_crossings
 from facefolds_core.model.layers import LinearStack
 
 CHUNK = {"cpu": 1 << 15, "cuda": 1 << 21}
 """Points that the field is evaluated at together without gradient: on a CPU the activations then stay in its cache."""
-
-
-class Manifolds(Protocol):
-    """What a model of the surfaces must offer; the rest of the model asks nothing else of it."""
-
-    @property
-    def num_layers(self) -> int: ...
-
-    @property
-    def centre(self) -> Tensor:
-        """[3], c."""
-        ...
-
-    @property
-    def chart(self) -> Chart:
-        """Where (u, v) and radii lie."""
-        ...
-
-    @property
-    def torso(self) -> Torso | None:
-        """What stays in the room while the head turns."""
-        ...
-
-    @property
-    def window(self) -> Window:
-        """(u0, u1, v0, v1) beyond which there are no surfaces."""
-        ...
-
-    @property
-    def radius(self) -> float:
-        """Radius of the ball around c that encloses all layers."""
-        ...
-
-    def crossings(self, origins: Tensor, directions: Tensor, pose: Similarity | None = None) -> Crossings:
-        """Rays [R, 3] -> nearest crossing with each layer, outermost first; differentiable without a pose.
-
-        Args:
-            pose: of the head, which turns over a torso (head -> world); points are those of the layers as made.
-        """
-        ...
-
-    def radii_at(self, uv: Tensor) -> tuple[Tensor, Tensor]:
-        """Directions (u, v) [M, 2] -> radius of each layer [M, N], and whether it has a point there [M, N]."""
-        ...
-
-    def regularisation(self) -> Tensor:
-        """Penalty that keeps the surfaces tame, a scalar."""
-        ...
 
 
 class MlpManifolds(nn.Module):
@@ -124,10 +74,14 @@ class MlpManifolds(nn.Module):
         return len(self.levels)
 
     def crossings(self, origins: Tensor, directions: Tensor, pose: Similarity | None = None) -> Crossings:
+        """Rays [R, 3] -> nearest crossing with each layer, outermost first; differentiable. A pose moves no layer."""
         return first_crossings(self, self.levels, origins, directions, self.centre, self.radius, self.samples)
 
     def radii_at(self, uv: Tensor) -> tuple[Tensor, Tensor]:
-        """By rays from the enclosing ball towards c."""
+        """Directions (u, v) [M, 2] -> radius of each layer [M, N], and whether it has a point there [M, N].
+
+        By rays from the enclosing ball towards c.
+        """
         outward = uv_to_directions(uv)
         crossings = self.crossings(self.centre + self.radius * outward, -outward)
         return self.radius - crossings.distance, crossings.hit

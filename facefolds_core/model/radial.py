@@ -97,10 +97,16 @@ class RadialManifolds(nn.Module):
         return torch.cat([first, torch.where(self.second > 0, self.second, torch.nan)], -1)
 
     def regularisation(self) -> Tensor:
+        """0: they are trained by other means."""
         return self.middle.new_zeros(())
 
     def crossings(self, origins: Tensor, directions: Tensor, pose: Similarity | None = None) -> Crossings:
-        """Nearest crossing with each layer. The compiled search where no gradient is asked for on a CPU."""
+        """Rays [R, 3] -> nearest crossing with each layer, outermost first. The compiled search where no gradient is
+        asked for on a CPU.
+
+        Args:
+            pose: of the head, which turns over a torso (head -> world); points are those of the layers as made.
+        """
         bend = self.bend(pose)
         if bend is not None:
             return self._turned(origins, directions, bend)

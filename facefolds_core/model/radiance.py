@@ -13,9 +13,11 @@ from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.geometry.sphere_uv import Window
 from facefolds_core.geometry.torso import Torso
 from facefolds_core.model.compositing import compositing_weights
+from facefolds_core.model.grids import GridTextures
 from facefolds_core.model.intersection import Crossings
-from facefolds_core.model.manifolds import Manifolds
-from facefolds_core.model.textures import TexelGrid, Textures
+from facefolds_core.model.manifolds import MlpManifolds
+from facefolds_core.model.radial import RadialManifolds
+from facefolds_core.model.textures import MlpTextures, TexelGrid
 
 RAYS_AT_ONCE = 8192
 """Rays that `render` and `surface_points` work on together: bounds their memory."""
@@ -59,7 +61,7 @@ class RadianceManifolds(nn.Module):
         textures: what they look like.
     """
 
-    def __init__(self, manifolds: Manifolds, textures: Textures) -> None:
+    def __init__(self, manifolds: MlpManifolds | RadialManifolds, textures: MlpTextures | GridTextures) -> None:
         super().__init__()
         self.manifolds = manifolds
         self.textures = textures

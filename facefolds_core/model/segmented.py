@@ -7,11 +7,10 @@ A file `segments/00000.safetensors` holds some neighbouring frames: `frame_colou
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import torch
 from safetensors import SafetensorError, safe_open
 from torch import Tensor
 
@@ -99,20 +98,3 @@ class SegmentedTextures(GridTextures):
     def segment(self, number: int) -> dict[str, Tensor]:
         """All numbers of one segment, as they are in its file (which may be gone from its folder by now)."""
         return {name: self._files[number].get_tensor(name) for name in ("frame_colour", "frame_alpha")}
-
-    def _look_up(self, layer: Tensor, time: Tensor) -> Callable[[Tensor, Tensor], Tensor]:
-        """As in `GridTextures`; of points at several times, one time after the other."""
-        if len(time) == 0 or bool((time == time[0]).all()):
-            return super()._look_up(layer, time)
-        groups = []
-        for at in time.unique():
-            which = (time == at).nonzero()[:, 0]
-            groups.append((which, super()._look_up(layer[which], time[which])))
-
-        def texel(i: Tensor, j: Tensor) -> Tensor:
-            out = torch.zeros(len(i), 4, device=i.device)
-            for which, look in groups:
-                out[which] = look(i[which], j[which])
-            return out
-
-        return texel

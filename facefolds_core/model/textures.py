@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Protocol
 
 import torch
 from torch import Tensor, nn
@@ -42,29 +41,6 @@ class TexelGrid:
 
     window: Window
     shape: tuple[int, int]
-
-
-class Textures(Protocol):
-    """What a model of the appearance must offer."""
-
-    @property
-    def num_frames(self) -> int: ...
-
-    def reflection_maps(self) -> ReflectionMaps | None:
-        """The reflection that all layers and frames share, or None."""
-        ...
-
-    def texel_grid(self) -> TexelGrid | None:
-        """Of all layers; None where there are no texels."""
-        ...
-
-    def shade(self, uv: Tensor, layer: Tensor, time: Tensor, directions: Tensor | None) -> Shaded:
-        """Points at uv [P, 2] of layers [P] (int64), at frame times [P]; directions [P, 3] of the rays, or None."""
-        ...
-
-    def sheet(self, uv: Tensor, layer: int, time: float) -> Shaded:
-        """Points at uv [P, 2] of one layer at one time: `shade` without a view term, where it can be had faster."""
-        ...
 
 
 def positional_encoding(x: Tensor, octaves: int) -> Tensor:
@@ -167,6 +143,7 @@ class MlpTextures(nn.Module):
         return torch.lerp(embedding(before, self.latents), embedding(after, self.latents), (time - before)[:, None])
 
     def sheet(self, uv: Tensor, layer: int, time: float) -> Shaded:
+        """Points at uv [P, 2] of one layer at one time: `shade` without a view term, in bounded memory."""
         parts = []
         for at in uv.split(TEXELS_AT_ONCE):
             layers = torch.full((len(at),), layer, dtype=torch.int64, device=uv.device)
@@ -176,6 +153,7 @@ class MlpTextures(nn.Module):
         return Shaded(torch.cat([part.rgb for part in parts]), torch.cat([part.alpha for part in parts]), None)
 
     def shade(self, uv: Tensor, layer: Tensor, time: Tensor, directions: Tensor | None) -> Shaded:
+        """Points at uv [P, 2] of layers [P] (int64), at frame times [P]; directions [P, 3] of the rays, or None."""
         encoded = positional_encoding(uv, self.uv_frequencies)
         h = torch.cat([encoded, self.coordinate[layer], self.latent(time)], -1)
         for linear in self.hidden:

@@ -87,11 +87,6 @@ class GridTextureParams(Section):
     learning_rate: Rate = 0.02
     """Of the colours shared by layers and frames; it falls along the last level. The other rates are factors on it."""
 
-    full_rate_iterations: Count = 460
-    """Of more `iterations` than these, the steps at half and full resolution are smaller in proportion, and smoothing
-    is rarer: they go the same way more finely. At full rate four times as many lost 0.3 dB
-    on cameras left out (`mugsy`, `studio`), since layers begin to show each camera its own picture."""
-
     steps_per_frame: Count = 20
     """Of the iterations after the rounds of geometry there are at least so many a frame of the capture: two fifths of
     them at half resolution. With a fixed number a film of 200 frames stood still (6 % of what changes was explained,
@@ -184,7 +179,7 @@ class ExplicitParams(Section):
 
     iterations: Count = 300
     """Adam steps of rounds and textures together. More are made where `geometry` or `textures.steps_per_frame` need
-    them."""
+    them. Four times 460 lost 0.3 dB on cameras left out, since layers begin to show each camera its own picture."""
 
     start: StartParams = StartParams()
     """Charts that are tried for the subject as it was found."""

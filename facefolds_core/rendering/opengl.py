@@ -124,7 +124,7 @@ class OpenGLRenderer:
         return str(self._context.info["GL_RENDERER"])
 
     def render(self, camera: Camera, frame: int, background: ArrayLike = BLACK) -> tuple[Image, Image]:
-        """As `render_asset`: rgb (H, W, 3) and alpha (H, W), float32 in [0, 1], of frame `frame`.
+        """One ray a pixel: rgb (H, W, 3) and alpha (H, W), float32 in [0, 1], of frame `frame`.
 
         Args:
             camera: in the world; an asset with a track stands there as it did in that frame.

@@ -1,6 +1,6 @@
 """The pixel filter of pictures: each pixel the mean over its square, by SIDE x SIDE rays. Slow and plain, by Embree.
 
-`areas` does the same, compiled, and keeps what serves several frames; one ray a pixel is `reference.render_asset`.
+`areas` does the same, compiled, and keeps what serves several frames; one ray a pixel is `reference.composite`.
 """
 
 from __future__ import annotations

@@ -168,17 +168,6 @@ def opacity(hits: Hits, textures: Sequence[Texture]) -> Image:
     return np.asarray(1 - light, np.float32)
 
 
-def render_asset(asset: Layered, camera: Camera, frame: int, background: ArrayLike = BLACK) -> tuple[Image, Image]:
-    """One picture: rgb (H, W, 3) and alpha (H, W) of frame `frame`.
-
-    For many of a still head, keep a caster and its hits.
-
-    Args:
-        camera: in the world; an asset with a track stands there as it did in that frame.
-    """
-    return composite(AssetCaster(asset, frame).cast(seen_from(asset, camera, frame)), asset.frame(frame), background)
-
-
 def seen_from(asset: Layered, camera: Camera, frame: float) -> Camera:
     """A camera of the world in the frame of the meshes, which an asset with a `track` moves."""
     track = track_of(asset)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from contextlib import nullcontext
 
 import numpy as np
 import torch
@@ -160,10 +159,7 @@ class PosedView:
 
     def _turn_model(self, frame: int) -> None:
         camera = self._camera if self._poses is None else self._poses.camera(self._camera, frame)
-        # Without gradients layers are crossed by compiled code: in each frame anew torch's own would take minutes.
-        with nullcontext() if self._poses is None else torch.no_grad():
-            pose = None if self._poses is None else self._poses.at(frame)
-            self.model = ModelView(self._model, camera, pose)
+        self.model = ModelView(self._model, camera, None if self._poses is None else self._poses.at(frame))
 
     def _turn_asset(self, frame: int) -> None:
         self.asset = view_of(self._files.full, self._camera, frame)

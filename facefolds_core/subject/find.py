@@ -10,12 +10,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from facefolds_core.captures.found_scene import GAUSSIANS, MATTES
 from facefolds_core.captures.scene import Scene
 from facefolds_core.errors import UserError
-from facefolds_core.files.frame_store import write_frames
 from facefolds_core.files.reading import is_there
-from facefolds_core.files.writing import atomic_folder
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.params import SubjectParams
 from facefolds_core.spacing import spread
@@ -30,7 +27,7 @@ from facefolds_core.subject.gaussians import GaussianMethod
 from facefolds_core.subject.hull import contradicted, looks_like
 from facefolds_core.subject.mattes import Key, Mattes, Source
 from facefolds_core.subject.splats import Splats
-from facefolds_core.subject.storage import BODY, Body, FoundSubject, read_body, read_found, write_found
+from facefolds_core.subject.storage import BODY, Body, FoundSubject, read_body, read_found
 
 Array = NDArray[np.float32]
 
@@ -44,8 +41,7 @@ SURE_OPACITY = 0.99
 
 DEFAULT_SUBJECT = SubjectParams()
 """Of a subject that is found where no stage `subject` is: while `normalize` looks for poses in pictures, since a change
-of the section `subject` shall not make every capture be normalised again; and in a training of a scene that never went
-through the stages, as those of tests are."""
+of the section `subject` shall not make every capture be normalised again."""
 
 
 @dataclass(frozen=True)
@@ -198,35 +194,16 @@ def judged(scene: Scene, splats: Splats, views: Sequence[CutPicture]) -> tuple[C
     return fit, -10 * math.log10(max(float(np.mean(squares)), 1e-10))
 
 
-def found_in(scene: Scene, params: SubjectParams, folder: Path) -> Scene:
-    """The scene with subject and mattes; what it has not is found now, and written to the folder.
-
-    Args:
-        folder: there while the scene is used.
-    """
-    if scene.found_gaussians() is not None and all_mattes(scene):
-        return scene
-    found, mattes = find_subject(scene, params)
-    with atomic_folder(folder) as temporary:
-        write_found(temporary / GAUSSIANS, found)
-        if not all_mattes(scene):
-            keys = sorted(key for key in scene.open_frames() if scene.splits[key[0]] == "train")
-            rows = ((*key, matte.opacity[..., None]) for key, matte in mattes.each(keys))
-            write_frames(temporary / MATTES, (scene.height, scene.width, 1), rows)
-    made = folder / MATTES
-    return replace(scene, gaussians=folder / GAUSSIANS, mattes=made if made.exists() else scene.mattes)
-
-
-def all_mattes(scene: Scene) -> bool:
-    """Whether the subject's opacity is known in every training picture."""
-    mattes, training = scene.open_mattes(), set(scene.indices("train"))
-    return mattes is not None and all(key in mattes for key in scene.open_frames() if key[0] in training)
-
-
 def subject_in(scene: Scene) -> FoundSubject:
-    """Of a scene whose subject was found."""
+    """The subject that was found before.
+
+    Raises:
+        UserError: if it was not.
+    """
     path = scene.found_gaussians()
-    assert path is not None
+    if path is None or scene.open_mattes() is None:
+        remedy = f"run `dvc repro subject@{scene.subject}` first"
+        raise UserError("the subject of this scene has not been found", file=scene.folder, remedy=remedy)
     return read_found(path, len(scene.indices("train")))
 
 

@@ -30,14 +30,6 @@ HIDDEN = 0.01
 """What lies so far behind the subject's surface, units, a camera does not see."""
 DIRECTIONS = 3000
 """Places that are tried, evenly on the sphere: 4 degrees apart."""
-ABOVE = math.radians(10)
-"""Of cameras farther than 90 degrees to both sides the hull reaches over the head."""
-NEIGHBOURS = 0.5
-"""Least cosine between cameras with a view halfway between them: farther apart, it lies above or below all others."""
-HIDDEN = 0.01
-"""What lies so far behind the subject's surface, units, a camera does not see."""
-DIRECTIONS = 3000
-"""Places that are tried, evenly on the sphere: 4 degrees apart."""
 ALL_AROUND = 0.2
 """Length of the mean of the cameras' directions under which they stand all around: those of a half circle have 0.64."""
 SMALLEST = 0.01

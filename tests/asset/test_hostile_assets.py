@@ -26,6 +26,7 @@ from tests.asset.filmed import filmed, packaged
 from tests.asset.test_validation import textures
 from tests.assets import CENTRE, cap_mesh
 from tests.hostile.fuzz_assets import edit, put
+from tests.hostile.structured import ODD
 from tests.viewer.fixtures import file_entry
 
 Value = dict[str, Any]
@@ -113,16 +114,11 @@ def test_a_mesh_that_claims_more_than_there_is(rich_copy: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["manifest.json", "full.mp4", "full_meshes.bin", "poster.png"])
-@pytest.mark.parametrize("kind", ["fifo", "device", "folder", "loop"])
+@pytest.mark.parametrize("kind", ["FIFO", "device", "folder", "loop"])
 def test_what_is_no_file_is_not_opened(rich_copy: Path, name: str, kind: str) -> None:
     path = rich_copy / name
     path.unlink()
-    if kind == "fifo":
-        os.mkfifo(path)
-    elif kind == "folder":
-        path.mkdir()
-    else:
-        path.symlink_to("/dev/zero" if kind == "device" else name)
+    ODD[kind](path)
     refused(rich_copy, name)
 
 

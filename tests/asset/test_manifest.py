@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import functools
 import json
-import operator
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -16,6 +14,7 @@ from facefolds_core import __version__
 from facefolds_core.asset.manifest_file import SCHEMA_PATH, manifest_schema, parse_manifest, seal_is_whole
 from facefolds_core.errors import UserError
 from tests.assets import make_asset
+from tests.hostile.fuzz_assets import LACKING, put
 
 
 @pytest.fixture(scope="module")
@@ -50,10 +49,6 @@ REFLECTION: dict[str, Any] = {
     **{name: [0, 4 * i, 4, 4] for i, name in enumerate(RECTS)},
     **{f"{name}_scale": 0.5 for name in ("environment", "gloss", "offset")},
 }
-
-
-LACKING = object()
-"""In place of a new value: the key is left out."""
 
 
 LEVEL = ("levels", 0)
@@ -97,11 +92,7 @@ def test_schema_and_models_refuse_the_same(
     path: Path, tmp_path: Path, place: tuple[str | int, ...], new: object
 ) -> None:
     value = json.loads(path.read_text())
-    holder = functools.reduce(operator.getitem, place[:-1], value)
-    if new is LACKING:
-        del holder[place[-1]]
-    else:
-        holder[place[-1]] = new
+    put(*place, to=new)(value)
     assert not VALIDATOR.is_valid(value)
     with pytest.raises(UserError):
         parse_manifest(written(tmp_path, json.dumps(value)))

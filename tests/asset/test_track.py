@@ -22,12 +22,12 @@ from facefolds_core.asset.validation import validate_asset
 from facefolds_core.errors import UserError
 from facefolds_core.geometry.torso import Torso
 from facefolds_core.rendering.areas import view_of
-from facefolds_core.rendering.reference import render_asset
 from tests.assets import MOVING, OVER_TORSO, TORSO, TRACK, make_asset
 from tests.engines.tracks import with_track
 from tests.geometry.test_track import SHIFTS
 from tests.gltf_files import opened
 from tests.hostile.fuzz_assets import edit, put
+from tests.pictures import render_asset
 from tests.scenes import look_at_origin
 from tests.viewer.fixtures import file_entry
 

@@ -19,7 +19,7 @@ from facefolds_core.cli import app
 from facefolds_core.errors import UserError
 from tests.assets import cap_mesh
 from tests.hostile.damage import flip_bits
-from tests.hostile.fuzz_assets import edit, put
+from tests.hostile.fuzz_assets import edit, put, swap
 from tests.viewer.fixtures import change_manifest, file_entry
 
 READ = ("manifest.json", "full_meshes.bin", "full.mp4")
@@ -85,18 +85,13 @@ def test_wrong_values(rich_copy: Path, change: Callable[[Any], object], file: st
     assert_found(rich_copy, file, word)
 
 
-def swap_halves(manifest: dict[str, Any]) -> None:
-    texture = manifest["levels"][1]["texture"]
-    texture["colour_rect"], texture["alpha_rect"] = texture["alpha_rect"], texture["colour_rect"]
-
-
 @pytest.mark.parametrize(
     ("change", "word"),
     [
         (textures(frame_rate=[25, 1]), "frames a second"),
         (put(*TEXTURE, "videos", 0, "mime", to='video/mp4; codecs="avc1.42001e"'), "MIME type"),
         (lambda manifest: manifest["levels"][1]["layers"].reverse(), "outermost in"),
-        (swap_halves, "alpha_rect"),
+        (lambda manifest: swap(manifest["levels"][1]["texture"], "colour_rect", "alpha_rect"), "alpha_rect"),
     ],
 )
 def test_what_is_wrong_but_can_be_read(rich_copy: Path, change: Callable[[Any], object], word: str) -> None:

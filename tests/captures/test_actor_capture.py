@@ -4,18 +4,19 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import cv2
 import numpy as np
 import pytest
 
 from facefolds_core.captures.actor import SEGMENT, make_rig, render, tracked_mesh, write_capture
 from facefolds_core.captures.actor.motion import pose_at
 from facefolds_core.captures.actor.shape import distance
+from facefolds_core.captures.tracked import read_obj
 from facefolds_core.errors import UserError
 from facefolds_core.files.paths import SubjectFolders
 from facefolds_core.files.writing import read_json, write_json
 from facefolds_core.params import CaptureParams
-from facefolds_core.pipeline.capture import capture
+from facefolds_core.pipeline.capture import capture as run_stage
+from tests.filmed import Reader
 
 PARAMS = CaptureParams(cameras=3, frames=2, height=48, width=32, plates=False)
 
@@ -25,23 +26,6 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("actor") / "capture"
     write_capture(folder, PARAMS)
     return folder
-
-
-def parse_krt(path: Path) -> dict[str, tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    """An independent reader: name -> K (3, 3), distortion (5,), [R | t] (3, 4)."""
-    cameras = {}
-    for block in path.read_text().strip().split("\n\n"):
-        name, *rows = block.split("\n")
-        numbers = [np.array(row.split(), float) for row in rows]
-        cameras[name] = (np.stack(numbers[:3]), numbers[3], np.stack(numbers[4:]))
-    return cameras
-
-
-def read_mesh(folder: Path, frame: str) -> np.ndarray:
-    """(V, 3) vertices in the world."""
-    vertices = np.frombuffer((folder / f"{frame}.bin").read_bytes(), "<f4").reshape(-1, 3)
-    transform = np.loadtxt(folder / f"{frame}_transform.txt")
-    return vertices @ transform[:, :3].T + transform[:, 3]
 
 
 def test_all_files_are_there(written: Path) -> None:
@@ -56,41 +40,22 @@ def test_all_files_are_there(written: Path) -> None:
     assert (written / "frame_list.txt").read_text().split("\n") == [f"{SEGMENT} 000001", f"{SEGMENT} 000002", ""]
 
 
-def test_stored_images_are_the_rendered_ones(written: Path) -> None:
-    picture = render(make_rig(PARAMS).cameras[1], 0.5 * PARAMS.seconds)
-    image = cv2.imread(str(written / f"images/{SEGMENT}/A001/000002.png"))
-    mask = cv2.imread(str(written / f"masks/{SEGMENT}/A001/000002.png"), cv2.IMREAD_UNCHANGED)
-    assert np.array_equal(image[..., ::-1], picture.rgb)
-    assert np.array_equal(mask, np.rint(255 * picture.opacity).astype(np.uint8))
-
-
-def test_krt_counts_pixels_from_their_centres(written: Path) -> None:
-    K, distortion, world_to_camera = parse_krt(written / "KRT")["A002"]
-    camera = make_rig(PARAMS).cameras[2]
-    assert np.allclose(K[:2, 2], camera.K[:2, 2] - 0.5)
-    assert np.allclose(np.diag(K), np.diag(camera.K))
-    assert np.array_equal(distortion, np.zeros(5))
-    assert np.allclose(world_to_camera, camera.w2c, atol=1e-6)
-
-
-def test_krt_projects_the_mesh_into_the_mask(written: Path) -> None:
-    vertices = read_mesh(written / "tracked_mesh" / SEGMENT, "000001")
-    for name, (K, _, world_to_camera) in parse_krt(written / "KRT").items():
-        image = (vertices @ world_to_camera[:, :3].T + world_to_camera[:, 3]) @ K.T
-        column, row = np.rint(image[:, :2] / image[:, 2:]).astype(int).T
+def test_what_was_filmed_is_read_back(written: Path) -> None:
+    """Cameras (KRT counts pixels from their centres), pictures, and the tracked mesh, which projects into the masks."""
+    capture, rig = Reader("multiface")(written), make_rig(PARAMS).cameras
+    picture = render(rig[1], 0.5 * PARAMS.seconds)
+    np.testing.assert_array_equal(capture.images[1, 1].rgb(""), picture.rgb)
+    np.testing.assert_array_equal(capture.masks[1, 1].opacity("")[..., 0], np.rint(255 * picture.opacity))
+    vertices = capture.tracking.vertices[1]
+    np.testing.assert_allclose(read_obj(written / f"tracked_mesh/{SEGMENT}/000002.obj")[0], vertices, atol=1e-4)
+    np.testing.assert_allclose(vertices, tracked_mesh(0.5 * PARAMS.seconds).vertices, atol=1e-4)
+    for c, (view, camera) in enumerate(zip(capture.views, rig, strict=True)):
+        np.testing.assert_allclose(view.camera.K, camera.K, atol=1e-5)
+        np.testing.assert_allclose(view.camera.w2c, camera.w2c, atol=1e-6)
+        column, row = np.floor(camera.project(capture.tracking.world_vertices()[0])[0]).astype(int).T
         inside = (column >= 0) & (column < PARAMS.width) & (row >= 0) & (row < PARAMS.height)
-        mask = cv2.imread(str(written / f"masks/{SEGMENT}/{name}/000001.png"), cv2.IMREAD_UNCHANGED)
         assert inside.mean() > 0.9
-        assert np.mean(mask[row[inside], column[inside]] > 128) > 0.98
-
-
-def test_obj_and_bin_hold_the_same_vertices(written: Path) -> None:
-    folder = written / "tracked_mesh" / SEGMENT
-    lines = (folder / "000002.obj").read_text().splitlines()
-    vertices = np.array([line.split()[1:] for line in lines if line.startswith("v ")], float)
-    stored = np.frombuffer((folder / "000002.bin").read_bytes(), "<f4").reshape(-1, 3)
-    assert np.abs(vertices - stored).max() < 1e-4
-    assert sum(line.startswith("vt ") for line in lines) == len(vertices)
+        assert np.mean(capture.masks[c, 0].opacity("")[row[inside], column[inside]] > 128) > 0.98
 
 
 def test_an_interrupted_capture_leaves_nothing(tmp_path: Path) -> None:
@@ -156,7 +121,7 @@ def configured(data: Path, source: str, path: Path) -> SubjectFolders:
 
 def test_stage_generates_the_actor(tmp_path: Path) -> None:
     folders = configured(tmp_path / "data", "actor", tmp_path)
-    assert "6 pictures" in capture(folders)
+    assert "6 pictures" in run_stage(folders)
     assert read_json(folders.capture / "source.json") == {"source": "actor", "path": str(tmp_path)}
     assert (folders.capture / "KRT").is_file()
 
@@ -164,8 +129,8 @@ def test_stage_generates_the_actor(tmp_path: Path) -> None:
 def test_stage_notes_where_another_capture_is_and_refuses_one_that_is_not_there(tmp_path: Path) -> None:
     folders = configured(tmp_path / "data", "multiface", tmp_path / "elsewhere")
     with pytest.raises(UserError, match="elsewhere"):
-        capture(folders)
+        run_stage(folders)
     assert not folders.capture.exists()
     (tmp_path / "elsewhere").mkdir()
-    capture(folders)
+    run_stage(folders)
     assert [p.name for p in folders.capture.iterdir()] == ["source.json"]

@@ -15,6 +15,7 @@ def test_the_take_and_its_first_words_loop(end: float) -> None:
     assert pose_at(end - 1e-9) == pytest.approx(pose_at(0.0), abs=0.02)  # of the mouth; all else stands still
     for at_end, at_begin in zip(head_pose(end - 1e-9, 0.1), head_pose(0.0, 0.1), strict=True):
         assert at_end == pytest.approx(at_begin, abs=1e-6)
+    assert pose_at(3 * PERIOD + 0.3) == pytest.approx(pose_at(0.3), abs=1e-6)
 
 
 def test_two_blinks_that_shut_faster_than_they_open() -> None:

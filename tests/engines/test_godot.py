@@ -12,11 +12,10 @@ from PIL import Image
 
 from facefolds_core.asset import Asset
 from facefolds_core.engines.godot import CONTENTS, export
-from facefolds_core.rendering.reference import render_asset
 from tests.assets import make_asset
 from tests.engines.godot import errors, missing, pictures, run_godot, view_of
 from tests.engines.tracks import over_torso, with_track
-from tests.pictures import GREY_VALUE, expected_pictures, five_cameras, lit_picture, psnr
+from tests.pictures import GREY_VALUE, expected_pictures, five_cameras, lit_picture, psnr, render_asset
 from tests.viewer.fixtures import shining
 
 pytestmark = pytest.mark.slow

@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from PIL import Image
 
 from facefolds_core.asset import Asset
 from facefolds_core.engines.usd import STAGE, export
 from facefolds_core.errors import UserError
+from facefolds_core.rendering.reference import sample_texture
 from tests.assets import make_asset
 from tests.engines.tracks import with_track
 
@@ -88,16 +88,6 @@ def test_layers_have_their_order(exported: Path) -> None:
     assert [prim.GetAttribute("primvars:facefolds:layer").Get() for prim in meshes] == [2, 1, 0]
 
 
-def looked_up(picture: NDArray[Any], st: NDArray[Any]) -> NDArray[np.float64]:
-    """Bilinear, v up: (V, 3) in [0, 1]."""
-    height, width = picture.shape[:2]
-    x, y = st[:, 0] * width - 0.5, (1 - st[:, 1]) * height - 0.5
-    j, i = np.floor(x).astype(int), np.floor(y).astype(int)
-    a, b = (x - j)[:, None], (y - i)[:, None]
-    p = picture / 255.0
-    return (1 - b) * ((1 - a) * p[i, j] + a * p[i, j + 1]) + b * ((1 - a) * p[i + 1, j] + a * p[i + 1, j + 1])
-
-
 def shader_input(stage: Any, path: str, name: str) -> Any:
     from pxr import UsdShade
 
@@ -110,16 +100,14 @@ def test_vertices_find_the_colour_and_alpha_of_their_frame(caps: Asset, exported
     for index, mesh in enumerate(caps.layers):
         inner = ((mesh.st > 0.1) & (mesh.st < 0.9)).all(1)
         h, w = textures[index].shape[:2]
-        flat = np.stack([mesh.st[:, 0], 1 - mesh.st[:, 1]], 1)[inner]
-        expected = looked_up(textures[index], flat)
+        expected = sample_texture(textures[index], mesh.st[inner])
         assert (h, w) == tuple(reversed(caps.full.entry.layers[index].texture_rect[2:]))
         for name, primvar, channels in (("colour", "st", slice(0, 3)), ("alpha", "st_alpha", slice(3, 4))):
             file = shader_input(stage, f"/Face/Materials/layer_{index:02d}/{name}", "file").Get(frame)
             picture = np.asarray(Image.open(file.resolvedPath).convert("RGB"))
-            st = np.array(
-                stage.GetPrimAtPath(f"/Face/Head/layer_{index:02d}").GetAttribute(f"primvars:{primvar}").Get()
-            )
-            found = looked_up(picture, st[inner])[:, : expected[:, channels].shape[1]]
+            prim = stage.GetPrimAtPath(f"/Face/Head/layer_{index:02d}")
+            st = np.array(prim.GetAttribute(f"primvars:{primvar}").Get()) * [1, -1] + [0, 1]  # v is up
+            found = sample_texture(picture, st[inner])[:, : expected[:, channels].shape[1]]
             assert np.abs(found - expected[:, channels]).max() < 0.04, (index, name)
 
 

@@ -24,7 +24,7 @@ from facefolds_core.asset.reader import AssetLevel
 from facefolds_core.asset.validation import validate_asset
 from facefolds_core.rendering.reference import AssetCaster, composite
 from tests.hostile.damage import MUTATIONS, Counts, Outcome, fingerprint, outcome
-from tests.hostile.structured import ODD
+from tests.hostile.structured import ODD, damage_bytes
 from tests.hostile.watch import within
 from tests.scenes import look_at_origin
 from tests.viewer.fixtures import rich_asset
@@ -39,6 +39,7 @@ NONSENSE: tuple[Any, ...] = (
     *(float("nan"), float("inf"), -1, 0, -0.0, 1e-300, 1e300, 10**9, 10**18, 10**40, 2**63, 0.5),
     *([], {}, [[]], {"a": 1}),
 )
+LACKING = object()
 Damage = tuple[str, bool]
 """(what was done, whether it must be refused)."""
 
@@ -102,11 +103,9 @@ def names(place: Path) -> list[str]:
 
 def damage_file(place: Path, random: np.random.Generator) -> Damage:
     """Other bytes; the checksums stay."""
-    name, mutation = random.choice(names(place)), MUTATIONS[random.integers(len(MUTATIONS))]
-    content = (place / name).read_bytes()
-    damaged = mutation(content, random)
-    (place / name).write_bytes(damaged)
-    return f"{mutation.__name__} {name}", damaged != content
+    path = place / random.choice(names(place))
+    content = path.read_bytes()
+    return f"{damage_bytes(path, random)} {path.name}", path.read_bytes() != content
 
 
 def replace_file(place: Path, random: np.random.Generator) -> Damage:
@@ -191,8 +190,7 @@ def reorder(place: Path, random: np.random.Generator) -> Damage:
     elif what == "level twice":
         value["levels"].append(value["levels"][0])
     else:
-        texture = level["texture"]
-        texture["colour_rect"], texture["alpha_rect"] = texture["alpha_rect"], texture["colour_rect"]
+        swap(level["texture"], "colour_rect", "alpha_rect")
     seal(place, value)
     return f"{what} of {level['name']}", True
 
@@ -221,12 +219,20 @@ def edit(place: Path, change: Callable[[Any], object]) -> None:
     seal(place, value)
 
 
+def swap(value: Any, one: str, other: str) -> None:
+    """Two values of an object."""
+    value[one], value[other] = value[other], value[one]
+
+
 def put(*keys: str | int, to: object) -> Callable[[Any], None]:
-    """For `edit`: another value at a place."""
+    """For `edit`: another value at a place, or `LACKING`: none."""
 
     def change(value: Any) -> None:
         for key in keys[:-1]:
             value = value[key]
-        value[keys[-1]] = to
+        if to is LACKING:
+            del value[keys[-1]]
+        else:
+            value[keys[-1]] = to
 
     return change

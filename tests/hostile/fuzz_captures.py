@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import io
-import json
 import shutil
-from collections.abc import Callable
 from contextlib import redirect_stderr
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -17,8 +14,8 @@ from facefolds_core.captures.scene import Scene, read_scene
 from facefolds_core.captures.visibility import in_picture
 from facefolds_core.params import NormalizeParams
 from tests.captures.fixtures import SEGMENT, plan_of, save_wav, write_multiface, write_transforms
-from tests.hostile.damage import MUTATIONS, Counts, attempt, fingerprint
-from tests.hostile.structured import damage_lines, damage_path, damage_values
+from tests.hostile.damage import Counts, attempt, fingerprint
+from tests.hostile.structured import damage_bytes, damage_json, damage_lines, damage_path
 
 SECONDS = 10
 """Of one run; a sound one takes a tenth of a second."""
@@ -59,25 +56,10 @@ def damage(root: Path, random: np.random.Generator) -> str:
     those = [file for file in files if (file.suffix or file.name) == kind]
     path = those[int(random.integers(len(those)))]
     name = path.relative_to(root).as_posix()
-    ways: list[Callable[[], str]] = [lambda: _bytes(path, random), lambda: damage_path(path, random)]
-    if path.suffix in ("", ".txt", ".obj"):
-        ways += [lambda: damage_lines(path, random)] * 4
-    if path.suffix == ".json":
-        ways += [lambda: _json(path, random)] * 6
-    return f"{name}: {ways[int(random.integers(len(ways)))]()}"
-
-
-def _bytes(path: Path, random: np.random.Generator) -> str:
-    mutation = MUTATIONS[int(random.integers(len(MUTATIONS)))]
-    path.write_bytes(mutation(path.read_bytes(), random))
-    return mutation.__name__
-
-
-def _json(path: Path, random: np.random.Generator) -> str:
-    value: Any = json.loads(path.read_text())
-    words = damage_values(value, random)
-    path.write_text(json.dumps(value))
-    return words
+    ways = [damage_bytes, damage_path]
+    ways += [damage_lines] * 4 if path.suffix in ("", ".txt", ".obj") else []
+    ways += [damage_json] * 6 if path.suffix == ".json" else []
+    return f"{name}: {ways[int(random.integers(len(ways)))](path, random)}"
 
 
 def wrong(scene: Scene, sound: Images, pictures: bool) -> str:

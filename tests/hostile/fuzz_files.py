@@ -6,7 +6,6 @@ change that makes another valid file is found by DVC, which hashes them, and is 
 
 from __future__ import annotations
 
-import json
 import shutil
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -45,8 +44,8 @@ from facefolds_core.subject.splats import COLUMNS, Splats
 from facefolds_core.subject.storage import FoundSubject, read_found, write_found
 from tests.captures.test_scene import scene as scene_of_two_frames
 from tests.ellipsoids import Ellipsoids
-from tests.hostile.damage import MUTATIONS, Counts, attempt, fingerprint
-from tests.hostile.structured import damage_path, damage_values
+from tests.hostile.damage import Counts, attempt, fingerprint
+from tests.hostile.structured import damage_bytes, damage_json, damage_path
 from tests.scoring.fakes import SPEC
 
 SECONDS = 10
@@ -153,14 +152,7 @@ def damage(path: Path, random: np.random.Generator) -> str:
     choice = random.random()
     if choice < 0.15:
         return damage_path(path, random)
-    if path.suffix == ".json" and choice < 0.8:
-        value = json.loads(path.read_text())
-        words = damage_values(value, random)
-        path.write_text(json.dumps(value))
-        return words
-    mutation = MUTATIONS[int(random.integers(len(MUTATIONS)))]
-    path.write_bytes(mutation(path.read_bytes(), random))
-    return mutation.__name__
+    return (damage_json if path.suffix == ".json" and choice < 0.8 else damage_bytes)(path, random)
 
 
 def same(one: Any, other: Any) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import socket
 import time
+from collections.abc import Mapping
 from pathlib import Path
 from urllib.parse import urlsplit
 
@@ -39,8 +40,8 @@ HEADERS = (
 )
 
 
-def site(folder: Path) -> None:
-    """A player, an asset, and what must not be given out."""
+def site(folder: Path, more: Mapping[str, bytes] | None = None) -> None:
+    """A player, an asset, what must not be given out, and other or more files."""
     for name, content in {
         "player/index.html": b"<!doctype html>",
         "player/page.js": b"1",
@@ -49,6 +50,7 @@ def site(folder: Path) -> None:
         "asset/full.mp4": bytes(range(256)) * 40,
         "asset/notes.txt": SECRET,
         "secret": SECRET,
+        **(more or {}),
     }.items():
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / name).write_bytes(content)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
 import socket
@@ -11,6 +12,8 @@ from typing import Any
 
 import numpy as np
 
+from tests.hostile.damage import MUTATIONS
+
 WORDS = (
     *("nan", "inf", "-inf", "1e300", "-1e300", "1e-300", "0", "-1"),
     *("", "word", "1_000", "1e", "99999999999999999999", "\u0661"),
@@ -19,6 +22,21 @@ VALUES: tuple[Any, ...] = (
     *(float("nan"), float("inf"), 1e300, -1e300, 1e-300, 1e-12, 0, -1, 1 << 40, 10**400, True, False, None),
     *("", "1.5", "word", "\0", "x" * 300, "../..", "/dev/zero", [], {}, [[1, 2], [3]], [1] * 16),
 )
+
+
+def damage_bytes(path: Path, random: np.random.Generator) -> str:
+    """One of `MUTATIONS`."""
+    mutation = MUTATIONS[int(random.integers(len(MUTATIONS)))]
+    path.write_bytes(mutation(path.read_bytes(), random))
+    return mutation.__name__
+
+
+def damage_json(path: Path, random: np.random.Generator) -> str:
+    """One of its values, see `damage_values`."""
+    value: Any = json.loads(path.read_text())
+    words = damage_values(value, random)
+    path.write_text(json.dumps(value))
+    return words
 
 
 def damage_lines(path: Path, random: np.random.Generator) -> str:

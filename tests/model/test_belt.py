@@ -12,10 +12,12 @@ from torch import Tensor
 
 from facefolds_core.errors import UserError
 from facefolds_core.geometry.chart import Belt, Chart
+from facefolds_core.geometry.torso import Torso
 from facefolds_core.model import load_model, radial, save_model
 from facefolds_core.model.radial import RadialManifolds
 from facefolds_core.model.radial_kernel import SKIP, bounds, crossing_distances, heights
 from facefolds_core.model.storage import ExplicitSpec, build_model
+from tests.assets import TORSO
 from tests.model.manifolds import bumpy, check_compiled, check_gradient
 
 C = (-0.25, 0.0, 0.05)
@@ -136,13 +138,14 @@ def test_the_ball_around_c_holds_the_column() -> None:
     assert manifolds.radius > far.max() > manifolds.radii().max() + 0.1
 
 
-@pytest.mark.parametrize("belt", [None, Belt(0.2, 0.3)])
-def test_a_model_keeps_its_chart(tmp_path: Path, belt: Belt | None) -> None:
-    spec = SPEC.model_copy(update={"belt": belt})
+@pytest.mark.parametrize(("belt", "torso"), [(None, None), (Belt(0.2, 0.3), TORSO)])
+def test_a_model_keeps_its_chart_and_its_torso(tmp_path: Path, belt: Belt | None, torso: Torso | None) -> None:
+    spec = SPEC.model_copy(update={"belt": belt, "torso": torso})
     save_model(build_model(spec), spec, tmp_path)
     written = json.loads((tmp_path / "model.json").read_text())
     assert ("belt" in written) == (belt is not None)  # a model without one is read by older versions
-    assert load_model(tmp_path).chart == Chart(C, belt)
+    loaded = load_model(tmp_path)
+    assert (loaded.chart, loaded.torso) == (Chart(C, belt), torso)
 
 
 @pytest.mark.parametrize(

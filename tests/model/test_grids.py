@@ -27,7 +27,7 @@ def test_a_sheet_is_what_shade_gives(layer: int, time: float) -> None:
     uv = torch.rand(300, 2, generator=torch.Generator().manual_seed(1)) * 1.2 - 0.6  # beyond the window too
     sheet = textures.sheet(uv, layer, time)
     layers, times = torch.full((300,), layer), torch.full((300,), time)
-    other = torch.where(torch.arange(300) < 299, times, time + 0.5)  # not one time: texel by texel
+    other = torch.where(torch.arange(300) < 299, times, time + 0.5)  # not one time
     for shaded in (textures.shade(uv, layers, times, None), textures.shade(uv, layers, other, None)):
         torch.testing.assert_close(sheet.rgb[:299], shaded.rgb[:299], atol=1e-5, rtol=0)
         torch.testing.assert_close(sheet.alpha[:299], shaded.alpha[:299], atol=1e-5, rtol=0)

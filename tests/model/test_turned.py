@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 import torch
@@ -15,7 +13,6 @@ from facefolds_core.geometry.sphere_uv import st_to_uv
 from facefolds_core.geometry.torso import Torso
 from facefolds_core.geometry.track import Track, turn_of
 from facefolds_core.model.radial import RadialManifolds
-from facefolds_core.model.storage import ExplicitSpec, build_model, load_model, save_model
 from tests.assets import grid_faces
 
 C = (-0.25, 0.0, 0.0)
@@ -92,9 +89,3 @@ def test_without_a_pose_layers_are_as_they_were_made() -> None:
         posed = bumpy(None).crossings(origins, directions, NOW)
     torch.testing.assert_close(found.distance, plain.distance)
     torch.testing.assert_close(posed.distance, plain.distance)
-
-
-def test_a_model_keeps_its_torso(tmp_path: Path) -> None:
-    spec = ExplicitSpec(centre=C, torso=TORSO, window=WINDOW, nodes=(4, 4), texels=(4, 4), num_layers=2, num_frames=1)
-    save_model(build_model(spec), spec, tmp_path)
-    assert load_model(tmp_path).torso == TORSO

@@ -24,12 +24,12 @@ from facefolds_core.errors import UserError
 from facefolds_core.rendering.camera_paths import Eye, camera_of, distance_to_fit, fly_through, frame_due, turntable
 from facefolds_core.rendering.opengl import OpenGLRenderer
 from facefolds_core.rendering.pixels import render
-from facefolds_core.rendering.reference import AssetCaster, composite, render_asset, seen_from
+from facefolds_core.rendering.reference import AssetCaster, composite, seen_from
 from facefolds_core.rendering.reflection import reflected_colours
 from tests.asset.test_audio import tone
 from tests.assets import SOURCE, make_asset
 from tests.engines.tracks import over_torso, with_track
-from tests.pictures import psnr
+from tests.pictures import psnr, render_asset
 from tests.scenes import look_at_origin, view_of
 from tests.viewer.fixtures import change_manifest, file_entry, random_reflection, shining
 

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from facefolds_core.rendering.reference import AssetCaster, Hits, composite, opacity, render_asset, sample_texture
+from facefolds_core.rendering.reference import AssetCaster, Hits, composite, opacity, sample_texture
+from tests.pictures import render_asset
 from tests.scenes import look_at_origin
 
 SIZE = 16

@@ -14,9 +14,8 @@ import pytest
 from facefolds_core.errors import UserError
 from facefolds_core.serving import server as module
 from facefolds_core.serving.server import serving
-from tests.hostile.fuzz_server import ask
+from tests.hostile.fuzz_server import SECRET, ask, site
 
-SECRET = b"not to be seen"
 CONTENT = bytes(range(200))
 WAIT = 3.0
 """Seconds for an answer."""
@@ -27,23 +26,10 @@ def root(tmp_path_factory: pytest.TempPathFactory) -> Path:
     root = tmp_path_factory.mktemp("hostile")
     names = ["full.mp4", "link.drc", "inner.drc", "pipe.drc", "../secret", "/etc/passwd", "folder", "gone.drc"]
     manifest = json.dumps({"levels": [{"layers": [{"mesh": name} for name in names]}]}).encode()
-    for name, data in {
-        "player/index.html": b"<!doctype html>",
-        "player/page.js": b"1",
-        "player/draco/decoder.wasm": b"\0asm",
-        "player/.hidden": SECRET,
-        "asset/manifest.json": manifest,
-        "asset/full.mp4": CONTENT,
-        "asset/notes.txt": SECRET,
-        "asset/folder/file": SECRET,
-        "secret": SECRET,
-    }.items():
-        (root / name).parent.mkdir(parents=True, exist_ok=True)
-        (root / name).write_bytes(data)
-    (root / "asset" / "link.drc").symlink_to(root / "secret")
+    more = {"player/draco/decoder.wasm": b"\0asm", "asset/folder/file": SECRET}
+    site(root, {"asset/manifest.json": manifest, "asset/full.mp4": CONTENT, **more})
     (root / "asset" / "inner.drc").symlink_to("full.mp4")
     (root / "player" / "link.js").symlink_to(root / "secret")
-    os.mkfifo(root / "asset" / "pipe.drc")
     return root
 
 

@@ -20,7 +20,7 @@ from facefolds_core.files.paths import SubjectFolders
 from facefolds_core.geometry.track import Track
 from facefolds_core.params import SubjectParams
 from facefolds_core.subject import find
-from facefolds_core.subject.find import all_mattes, find_subject, found_in, frames_looked_at, subject_in
+from facefolds_core.subject.find import find_subject, frames_looked_at, subject_in
 from facefolds_core.subject.fit import fit_pictures
 from facefolds_core.subject.folder import RED, make_folder, tile
 from facefolds_core.subject.found import DOUBT, belief, joined, subject_of
@@ -70,7 +70,7 @@ def test_each_picture_has_a_matte_named_ones_first_then_the_captures_then_beside
     assert Counter(one["source"] for one in told) == {"capture": 1, "named": 2, "plate": 11}
     whole = found_scene(folders)
     store = whole.open_mattes()
-    assert store is not None and all_mattes(whole) and len(list(store)) == 14
+    assert store is not None and sorted(store) == sorted(scene.open_frames()) and len(list(store)) == 14
     assert int(store.image(0, 0)[5, 5, 0]) == 50 and int(store.image(2, 1)[5, 5, 0]) == 150
     true = render(scene.cameras[1], OPAQUE, 0)[1] > 0.5
     assert ((store.image(1, 0)[..., 0] > 127) == true).mean() > 0.96
@@ -109,20 +109,16 @@ def test_a_folder_without_mattes_or_with_one_of_another_shape_is_refused(
     assert not folders.subject.exists()
 
 
-def test_an_empty_room_has_no_subject(tmp_path: Path) -> None:
-    scene = make_scene(tmp_path, (), size=SIZE)
-    black_plates(scene)
+@pytest.mark.parametrize("empty", ["plates", "mattes"])
+def test_an_empty_room_has_no_subject(tmp_path: Path, empty: str) -> None:
+    scene = make_scene(tmp_path, () if empty == "plates" else OPAQUE, size=SIZE)
+    if empty == "plates":
+        black_plates(scene)
+    else:
+        clear = np.zeros((SIZE, SIZE, 1), np.uint8)
+        write_frames(scene.folder / "mattes.arrow", clear.shape, [(*key, clear) for key in scene.open_frames()])
     with pytest.raises(UserError, match="no subject was found"):
         find_subject(scene, PARAMS)
-
-
-def test_a_scene_that_has_all_is_left_alone_and_one_without_is_given_what_it_lacks(tmp_path: Path) -> None:
-    whole = make_scene(tmp_path / "whole", size=SIZE, mattes=True)
-    assert found_in(whole, PARAMS, tmp_path / "made") is whole and not (tmp_path / "made").exists()
-    (whole.folder / "gaussians.npz").unlink()
-    found = found_in(whole, PARAMS, tmp_path / "made")
-    assert [path.name for path in (tmp_path / "made").iterdir()] == ["gaussians.npz"]
-    assert found.mattes is None and len(subject_in(found).splats) <= 300
 
 
 def test_few_cameras_before_a_head_that_turns_look_at_several_frames(tmp_path: Path) -> None:

@@ -146,35 +146,3 @@ def light_on(codes: Tensor, texture: Tensor, chosen: Tensor, min_light: float) -
     before = light_before(look_up(codes, texture)[..., 3])
     met = (look_up(codes, marked)[..., 3] > 0) & (before >= min_light)
     return torch.where(met, before, 0.0).amax(1)
-
-
-def follow_step(
-    own: Tensor,  # [m], which texels move
-    static: tuple[Tensor, Tensor],  # colour [M, 3] and layers [M, N, 4]
-    frame_colour: Tensor,  # [M, 3], updated in place, as all below
-    frame_alpha: Tensor,  # [M, N]
-    colour_moments: Tensor,  # [2, m, 3]
-    alpha_moments: Tensor,  # [2, m, N]
-    texture: Tensor,  # [M, N, 4]
-    gradient: Tensor,  # [M, N, 4]
-    rates: Tensor,  # [2]
-    correct: Tensor,  # [2]
-    betas: Betas,
-) -> None:
-    """As `follow_kernel.follow_step`."""
-    alpha, g = texture[own, :, 3], gradient[own]
-    slopes = g[..., :3].sum(1), g[..., 3] * alpha * (1 - alpha)
-    parts = (frame_colour, colour_moments), (frame_alpha, alpha_moments)
-    for (values, moments), slope, rate in zip(parts, slopes, rates, strict=True):
-        stacked = torch.cat([values[own][None], moments])
-        _adam(stacked, slope, torch.ones_like(slope, dtype=torch.bool), rate, correct, betas)
-        values[own] = stacked[0]
-        moments.copy_(stacked[1:])
-    texture[own] = activate(static[0][own], static[1][own], frame_colour[own], frame_alpha[own])
-
-
-def smooth(values: Tensor, height: int, width: int) -> Tensor:
-    """As `adam_kernel.smooth`, of [height width, N]."""
-    image = values.reshape(height, width, -1).permute(2, 0, 1)[None]
-    padded = torch.nn.functional.pad(image, (1, 1, 1, 1), mode="replicate")
-    return torch.nn.functional.avg_pool2d(padded, 3, 1)[0].permute(1, 2, 0).reshape(values.shape)

@@ -153,14 +153,11 @@ def test_a_missing_image_is_said_at_once(tmp_path: Path) -> None:
         _fitted(scene, tmp_path)
 
 
-@pytest.mark.parametrize("grey", [0, 90])
-def test_pictures_without_a_subject_are_refused(tmp_path: Path, grey: int) -> None:
-    scene = make_scene(tmp_path / "scene", size=24)
-    image = np.full((24, 24, 3), grey, np.uint8)
-    pairs = [(i, k) for i in range(len(scene.cameras)) for k in range(scene.num_frames)]
-    write_frames(scene.folder / "frames.arrow", image.shape, [(*pair, image) for pair in pairs])
-    write_frames(scene.folder / "mattes.arrow", (24, 24, 1), [(*pair, 0 * image[..., :1]) for pair in pairs])
-    with pytest.raises(UserError, match="no subject"):
+@pytest.mark.parametrize("missing", ["gaussians.npz", "mattes.arrow"])
+def test_a_scene_whose_subject_was_not_found_is_refused(tmp_path: Path, missing: str) -> None:
+    scene = make_scene(tmp_path / "scene", size=8, mattes=True)
+    (scene.folder / missing).unlink()
+    with pytest.raises(UserError, match=r"has not been found[\s\S]*dvc repro subject@spheres"):
         _fitted(scene, tmp_path)
 
 

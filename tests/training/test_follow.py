@@ -43,7 +43,7 @@ def test_light_on_chosen_texels_matches_the_reference() -> None:
     torch.testing.assert_close(torch.from_numpy(found), expected, atol=1e-6, rtol=0)
 
 
-def test_a_step_matches_the_reference_and_leaves_other_texels() -> None:
+def test_a_step_is_the_frames_part_of_one_of_all_and_leaves_other_texels() -> None:
     torch.manual_seed(0)
     m, own = SHAPE[0] * SHAPE[1], np.array([3, 4, 20])
     near = np.array([3, 4, 5, 20, 21])
@@ -58,12 +58,18 @@ def test_a_step_matches_the_reference_and_leaves_other_texels() -> None:
     pushed = gradient.permute(1, 0, 2).contiguous().numpy()
     tail = rates.numpy(), correct.numpy(), decays(BETAS)
     follow_kernel.follow_step(own, near, *(x.numpy() for x in static), *compiled, pushed, *tail)
-    expected = [x.clone() for x in (*values, *moments, texture)]
-    reference.follow_step(torch.from_numpy(own), static, *expected, gradient, rates, correct, BETAS)
-    for a, b in zip(compiled, expected, strict=True):
+    frame = [torch.cat([value[own][None], moment]) for value, moment in zip(values, moments, strict=True)]
+    still, all_rates = torch.zeros(3, 3, LAYERS, 4), torch.cat([torch.zeros(3), rates])
+    correct = torch.cat([torch.ones(2), correct])
+    reference.adam_step(torch.zeros(3, 3, 3), still, *frame, texture[own], gradient[own], all_rates, correct, BETAS)
+    shown = reference.activate(*(part[own] for part in static), *(state[0] for state in frame))
+    expected = *(state[0] for state in frame), *(state[1:] for state in frame), shown
+    found = *(part[own] for part in compiled[:2]), *compiled[2:4], compiled[4][own]
+    for a, b in zip(found, expected, strict=True):
         torch.testing.assert_close(torch.from_numpy(a), b, atol=1e-5, rtol=1e-4)
     others = np.setdiff1d(np.arange(m), own)
-    np.testing.assert_array_equal(compiled[0][others], values[0].numpy()[others])
+    for part, before in zip((*compiled[:2], compiled[4]), (*values, texture), strict=True):
+        np.testing.assert_array_equal(part[others], before.numpy()[others])
     assert not pushed.any()
 
 

@@ -98,8 +98,10 @@ def test_few_shares_still_meet_every_pixel_over_the_frames(scene: Scene) -> None
     assert set().union(*pixels) == set(seen(every, 0, every.shares))
 
 
-def test_perceptrons_rays_come_from_the_cameras_of_their_frame(scene: Scene) -> None:
-    turned = replace(scene, poses=TURNED)
+@pytest.mark.parametrize("poses", [None, TURNED], ids=["still", "turned"])
+def test_perceptrons_rays_have_the_colours_of_their_pixels(scene: Scene, poses: Track | None) -> None:
+    """In the cameras as they stand in their frame: all training pictures are drawn from."""
+    turned, cameras = replace(scene, poses=poses), set[tuple[int, int]]()
     sampler = RaySampler(turned, torch.tensor(CENTRE, dtype=torch.float32), 0.45, torch.device("cpu"))
     drawn = sampler.draw(400, torch.Generator().manual_seed(0))
     store = turned.open_frames()
@@ -110,6 +112,8 @@ def test_perceptrons_rays_come_from_the_cameras_of_their_frame(scene: Scene) -> 
         (x, y), _ = camera.project((o + d).numpy().astype(float))
         assert x % 1 == pytest.approx(0.5, abs=2e-3) and y % 1 == pytest.approx(0.5, abs=2e-3)
         assert rgb.numpy() * 255 == pytest.approx(store.image(c, int(t))[int(y), int(x)], abs=0.01)
+        cameras.add((c, int(t)))
+    assert cameras == {(c, k) for c in turned.indices("train") for k in range(turned.num_frames)}
 
 
 @pytest.mark.parametrize("stride", range(1, 10))

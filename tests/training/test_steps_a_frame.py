@@ -44,26 +44,6 @@ def test_orders_differ_and_repeat_with_the_seed() -> None:
     assert orders == [list(islice(again, 9)) for _ in range(2)]
 
 
-@pytest.mark.parametrize(("iterations", "pace"), [(183, 1.0), (460, 1.0), (740, 0.5), (1860, 1 / 6)])
-def test_a_longer_training_goes_the_same_way_in_smaller_steps(iterations: int, pace: float) -> None:
-    *rounds, half, last = plan(FITTED, params().model_copy(update={"iterations": iterations}), 1, PIXELS)
-    assert all(level.pace == 1 for level in rounds)
-    assert half.pace == last.pace == pytest.approx(pace)
-
-
-def test_many_frames_are_trained_at_full_rate() -> None:
-    assert {level.pace for level in plan(FITTED, params(), 200, PIXELS)} == {1.0}
-    doubled = params().model_copy(update={"iterations": 8180})
-    assert plan(FITTED, doubled, 200, PIXELS)[-1].pace == pytest.approx(0.5)
-
-
-@pytest.mark.parametrize("parts", [1, 2, 4, 7])
-def test_opacity_is_smoothed_as_often_in_a_longer_training(parts: int) -> None:
-    level = replace(plan(FITTED, params(), 1, PIXELS)[-1], pace=1 / parts)
-    smoothed = [i for i in range(168 * parts) if level.smooths(i, 3)]
-    assert smoothed == [3 * parts * k for k in range(56)]
-
-
 @pytest.mark.parametrize(("pixels", "stride"), [(3_000_000, 8), (2_000_000, 8), (1_440_000, 5), (540_672, 2), (100, 1)])
 def test_rounds_look_at_enough_of_small_pictures(pixels: int, stride: int) -> None:
     *rounds, half, last = plan(FITTED, params(), 12, pixels)

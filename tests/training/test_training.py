@@ -18,7 +18,7 @@ from facefolds_core.training.explicit.state import on_one_thread
 from facefolds_core.training.losses import batch_losses
 from facefolds_core.training.rays import RaySampler
 from facefolds_core.training.start import Start, find_start
-from tests.scenes import OPAQUE, make_scene, render
+from tests.scenes import OPAQUE, make_scene
 
 CPU = torch.device("cpu")
 TINY = {
@@ -59,21 +59,6 @@ def state_for(scene: Scene, settings: MlpParams, start: Start | None = None) -> 
     start = start or find_start(scene, settings)
     state = loop.new_state(settings, loop.model_spec(settings, start, scene.num_frames, ""), CPU)
     return state, RaySampler(scene, state.model.centre, start.radius, CPU)
-
-
-def test_rays_have_the_colours_of_their_pixels(scene: Scene) -> None:
-    _, sampler = state_for(scene, params())
-    rays = sampler.draw(300, torch.Generator().manual_seed(0))
-    images = {(c, k): render(scene.cameras[c], OPAQUE, k)[0] for c in scene.indices("train") for k in range(2)}
-    centres = np.array([camera.centre for camera in scene.cameras])
-    drawn = set()
-    for o, d, t, rgb in zip(rays.origins, rays.directions, rays.time, rays.rgb, strict=True):
-        c = int(np.abs(centres - o.numpy()).sum(1).argmin())
-        (x, y), _ = scene.cameras[c].project((o + d).numpy().astype(float))
-        assert x % 1 == pytest.approx(0.5, abs=1e-3) and y % 1 == pytest.approx(0.5, abs=1e-3)
-        assert rgb.numpy() == pytest.approx(images[c, int(t)][int(y), int(x)], abs=0.51 / 255)
-        drawn.add((c, int(t)))
-    assert drawn == images.keys()  # every training camera and frame
 
 
 def test_rays_that_miss_the_search_ball_are_not_drawn(scene: Scene) -> None:

@@ -5,9 +5,9 @@ from __future__ import annotations
 import os
 import shutil
 import subprocess
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pytest
@@ -17,6 +17,7 @@ from playwright.sync_api import FloatRect, Page, Route
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.serving.server import serving
 from facefolds_core.system.locks import holding
+from tests.pictures import GREY
 from tests.viewer.captured import captured
 
 PATIENCE = 60_000
@@ -119,19 +120,26 @@ class Player:
         return found
 
 
+MouseButton = Literal["left", "right"]
 NewPlayer = Callable[..., Player]
 Show = Callable[..., Player]
 
 
-def touching(player: Player) -> Callable[..., object]:
-    """What touches the screen: takes a kind, "touchStart", "touchMove" or "touchEnd", and the fingers' (x, y)."""
+def swipe(player: Player, *fingers: Sequence[tuple[float, float]]) -> None:
+    """Fingers touch the screen, each at its first (x, y), go on to the others, and leave it."""
     client = player.page.context.new_cdp_session(player.page)
-
-    def touch(kind: str, *points: tuple[float, float]) -> object:
+    for k, points in enumerate([*zip(*fingers, strict=True), ()]):
+        kind = "touchStart" if k == 0 else "touchMove" if points else "touchEnd"
         places = [{"x": x, "y": y} for x, y in points]
-        return client.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": places})
+        client.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": places})
 
-    return touch
+
+def drag(player: Player, place: tuple[float, float], by: tuple[float, float], button: MouseButton = "left") -> None:
+    """With the mouse, from a place."""
+    player.page.mouse.move(*place)
+    player.page.mouse.down(button=button)
+    player.page.mouse.move(place[0] + by[0], place[1] + by[1], steps=5)
+    player.page.mouse.up(button=button)
 
 
 def page_of_yours(
@@ -225,3 +233,15 @@ def show(new_player: NewPlayer, rich: Path) -> Show:
         return player
 
     return shown
+
+
+@pytest.fixture
+def opened(show: Show) -> Show:
+    """`show` at its full level, on grey, without the reflection."""
+
+    def of(**options: object) -> Player:
+        player = show(full=True, **options)
+        player.run("e.background = v; e.effects = false", GREY)
+        return player
+
+    return of

@@ -5,14 +5,15 @@ from __future__ import annotations
 import base64
 import io
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 import pytest
 from PIL import Image
 
-from tests.viewer.conftest import NO_WEBCODECS, NewPlayer, Player, element, page_of_yours
+from tests.viewer.conftest import NO_WEBCODECS, NewPlayer, Player, drag, element, page_of_yours
 
+START = (200, 120)
+"""Of drags."""
 VIEW = "[e.state.view.azimuth, e.state.view.elevation, e.state.view.distance]"
 
 
@@ -52,25 +53,18 @@ def test_a_page_bounds_the_view(new_player: NewPlayer, rich: Path) -> None:
         view = dict(zip(("azimuth", "elevation", "distance"), asked, strict=True))
         player.run("e.state = {view: v}", view)
         assert numbers(player) == pytest.approx(found)
-    drag(player, -300, -200)
+    drag(player, START, (-300, -200))
     assert numbers(player, "[e.player.view.goal.azimuth, e.player.view.goal.elevation]") == [20, -5]
-    drag(player, 20, 0)  # at once: what was beyond the end is forgotten
+    drag(player, START, (20, 0))  # at once: what was beyond the end is forgotten
     assert numbers(player, "[e.player.view.goal.azimuth]")[0] < 10
     player.run("e.minCameraOrbit = 'auto'; e.maxCameraOrbit = '30deg auto auto'; e.state = {view: {azimuth: 90}}")
     assert numbers(player)[0] == pytest.approx(30)
 
 
-def drag(player: Player, dx: float, dy: float, button: Literal["left", "right"] = "left") -> None:
-    player.page.mouse.move(200, 120)
-    player.page.mouse.down(button=button)
-    player.page.mouse.move(200 + dx, 120 + dy, steps=5)
-    player.page.mouse.up(button=button)
-
-
 def test_panning_and_double_clicks_move_what_is_looked_at(new_player: NewPlayer, rich: Path) -> None:
     player = element(new_player, rich)
     goal, home = "e.player.view.goal.target", numbers(player, "e.player.view.home.target")
-    drag(player, 30, 0, "right")
+    drag(player, START, (30, 0), "right")
     assert numbers(player, goal) != home
     player.run("e.resetView()")
     surface = "e.surfaceFromPoint(v[0], v[1])?.split(' ').map(Number)"
@@ -83,7 +77,7 @@ def test_panning_and_double_clicks_move_what_is_looked_at(new_player: NewPlayer,
     assert numbers(player, goal) == pytest.approx(home)
     player.run("e.disablePan = e.disableTap = true; e.resetView()")
     player.page.mouse.dblclick(230, 110)
-    drag(player, 30, 0, "right")
+    drag(player, START, (30, 0), "right")
     assert numbers(player, goal) == home
     assert numbers(player, "[e.player.view.goal.azimuth]")[0] < -5  # it turns instead
 
@@ -130,7 +124,7 @@ def test_camera_controls_and_zoom_can_be_switched_off(new_player: NewPlayer, ric
     player.page.keyboard.press("Shift+ArrowRight")
     assert numbers(player)[0] == pytest.approx(before[0] + 5)
     player.run("e.removeAttribute('disable-zoom'); e.setAttribute('camera-controls', 'none'); e.resetView()")
-    drag(player, -100, 0)
+    drag(player, START, (-100, 0))
     for key in ("Shift+ArrowRight", "+"):
         player.page.locator("[data-do=play]").press(key)
     player.page.wait_for_timeout(300)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from facefolds_core.asset import read_asset
-from tests.viewer.conftest import NewPlayer, Player, Show, page_of_yours, touching
+from tests.viewer.conftest import NewPlayer, Player, Show, drag, page_of_yours, swipe
 
 
 @pytest.fixture
@@ -105,36 +105,21 @@ def test_keys_turn_and_zoom(player: Player) -> None:
 
 
 def test_orbit_pan_and_zoom_by_pointer(player: Player) -> None:
-    mouse = player.page.mouse
-
-    def drag(button: str) -> None:
-        mouse.move(400, 300)
-        mouse.down(button=button)
-        mouse.move(480, 330, steps=4)
-        mouse.up(button=button)
-
-    drag("left")
+    drag(player, (400, 300), (80, 30))
     player.wait("Math.abs(e.player.view.get().azimuth) > 5")
-    drag("right")
+    drag(player, (400, 300), (80, 30), "right")
     player.wait("Math.hypot(...e.player.view.get().target) > 0.01")
     before = value(player, "e.player.view.get().distance")
-    mouse.wheel(0, -300)
+    player.page.mouse.wheel(0, -300)
     player.wait(f"e.player.view.get().distance < {before}")
 
 
 def test_touch_turns(show: Show) -> None:
     player = show(viewport={"width": 390, "height": 700}, has_touch=True, is_mobile=True)
-    touch = touching(player)
-    touch("touchStart", (200, 250))
-    for x in (180, 150, 120):
-        touch("touchMove", (x, 250))
-    touch("touchEnd")
+    swipe(player, [(x, 250) for x in (200, 180, 150, 120)])
     player.wait("e.player.view.get().azimuth > 5")
     before = value(player, "e.player.view.get().distance")
-    touch("touchStart", (150, 250), (250, 250))
-    for x in (140, 120, 90):
-        touch("touchMove", (x, 250), (400 - x, 250))
-    touch("touchEnd")
+    swipe(player, *([(side(x), 250) for x in (150, 140, 120, 90)] for side in (int, lambda x: 400 - x)))
     player.wait(f"e.player.view.get().distance < {before}")
 
 

@@ -11,7 +11,7 @@ from urllib.parse import urlsplit
 import numpy as np
 import pytest
 
-from tests.viewer.conftest import NewPlayer, Player, Show, page_of_yours, touching
+from tests.viewer.conftest import NewPlayer, Player, Show, page_of_yours, swipe
 
 COUNT_FRAMES = """window.frames_asked = 0; const ask = requestAnimationFrame.bind(window);
     window.requestAnimationFrame = (act) => { ++window.frames_asked; return ask(act); };"""
@@ -100,19 +100,12 @@ def test_one_finger_scrolls_the_page_upright_and_turns_across(opened: Opened) ->
     phone = {"viewport": {"width": 390, "height": 600}, "has_touch": True, "is_mobile": True}
     player = opened(ONE.format("") + TALL, **phone)
     assert player.run("return getComputedStyle(e.shadowRoot.querySelector('canvas')).touchAction") == "pan-y"
-    touch = touching(player)
-    touch("touchStart", (200, 200))
-    for k in range(1, 13):
-        touch("touchMove", (200, 200 - 10 * k))
-    touch("touchEnd")
+    swipe(player, [(200, 200 - 10 * k) for k in range(13)])
     player.page.wait_for_function("() => scrollY > 50")
     assert player.run("return [e.player.view.goal.azimuth, e.player.view.goal.elevation]") == [0, 0]
     player.page.wait_for_timeout(1000)  # the page has come to rest
     player.page.evaluate("() => scrollTo(0, 0)")
-    touch("touchStart", (200, 150))
-    for k in range(1, 9):
-        touch("touchMove", (200 - 10 * k, 150))
-    touch("touchEnd")
+    swipe(player, [(200 - 10 * k, 150) for k in range(9)])
     player.wait("e.player.view.goal.azimuth > 5")
     assert player.page.evaluate("() => scrollY") == 0
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
 
@@ -11,7 +10,7 @@ import pytest
 
 from facefolds_core.asset import read_asset
 from tests.assets import make_asset
-from tests.pictures import GREY, five_cameras, means_of_frames, psnr
+from tests.pictures import five_cameras, means_of_frames, psnr
 from tests.viewer.conftest import NO_WEBCODECS, Player, Show
 from tests.viewer.fixtures import change_manifest
 
@@ -25,18 +24,6 @@ def pictures(rich: Path) -> list[np.ndarray]:
     return means_of_frames(read_asset(rich), CAMERA)
 
 
-@pytest.fixture
-def opened(show: Show) -> Callable[..., Player]:
-    """On grey, without the reflection."""
-
-    def of(**options: object) -> Player:
-        player = show(full=True, **options)
-        player.run("e.background = v; e.effects = false", GREY)
-        return player
-
-    return of
-
-
 def nearest(player: Player, pictures: list[np.ndarray]) -> int:
     """Number of the frame that the player's picture is most like; it must be much more like it than any other."""
     scores = [psnr(player.capture(CAMERA)[..., :3], picture) for picture in pictures]
@@ -47,9 +34,7 @@ def nearest(player: Player, pictures: list[np.ndarray]) -> int:
 
 
 @DECODERS
-def test_every_seek_shows_the_frame_asked_for(
-    opened: Callable[..., Player], pictures: list[np.ndarray], script: str
-) -> None:
+def test_every_seek_shows_the_frame_asked_for(opened: Show, pictures: list[np.ndarray], script: str) -> None:
     player = opened(script=script)
     for frame in (5, 0, 3, 2, 4, 1, 5, 5):
         assert player.run("return await e.seek(v)", frame)
@@ -59,7 +44,7 @@ def test_every_seek_shows_the_frame_asked_for(
 
 @pytest.mark.parametrize("codec", ["vp9", "av1"])
 def test_the_other_videos_have_the_same_frames(
-    opened: Callable[..., Player], pictures: list[np.ndarray], rich_copy: Path, codec: str
+    opened: Show, pictures: list[np.ndarray], rich_copy: Path, codec: str
 ) -> None:
     """The videos before it are of a codec that no browser knows: the next one plays."""
 
@@ -76,7 +61,7 @@ def test_the_other_videos_have_the_same_frames(
         assert nearest(player, pictures) == frame
 
 
-def test_of_many_seeks_the_last_wins(opened: Callable[..., Player], pictures: list[np.ndarray]) -> None:
+def test_of_many_seeks_the_last_wins(opened: Show, pictures: list[np.ndarray]) -> None:
     player = opened()
     done = player.run("const all = [5, 1, 4, 2, 3].map((k) => e.seek(k)); return Promise.all(all)")
     assert done[-1] is True
@@ -84,7 +69,7 @@ def test_of_many_seeks_the_last_wins(opened: Callable[..., Player], pictures: li
 
 
 @DECODERS
-def test_playing_goes_round_without_a_gap(opened: Callable[..., Player], script: str) -> None:
+def test_playing_goes_round_without_a_gap(opened: Show, script: str) -> None:
     """Frames come in order and wrap round; slowly enough that software rendering need not leave any out."""
     player = opened(script=script)
     frames = player.run(
@@ -100,9 +85,7 @@ def test_playing_goes_round_without_a_gap(opened: Callable[..., Player], script:
     assert set(frames) == set(range(6))
 
 
-def test_while_playing_the_picture_is_that_of_the_frame_named(
-    opened: Callable[..., Player], pictures: list[np.ndarray]
-) -> None:
+def test_while_playing_the_picture_is_that_of_the_frame_named(opened: Show, pictures: list[np.ndarray]) -> None:
     """Colour and alpha come from one frame, and `frame` says which; looked at in the middle of playing."""
     player = opened()
     player.run("e.speed = 0.1; e.play()")

@@ -20,7 +20,7 @@ from facefolds_core.geometry.cameras import Camera
 from facefolds_core.rendering.pixels import render
 from tests.assets import MOVING, OVER_TORSO, make_asset
 from tests.gltf_files import opened
-from tests.pictures import GREY_VALUE, expected_means, five_cameras, psnr
+from tests.pictures import GREY_VALUE, expected_pictures, five_cameras, psnr
 from tests.viewer.fixtures import moving_asset
 from tests.viewer.gltf_viewers import GltfViewer, build, page_with, pictures
 
@@ -67,7 +67,7 @@ def shown(browser: Browser, reader: Path, glb: Path, cameras: Sequence[Camera]) 
 def test_five_views_agree_with_the_reference(browser: Browser, reader: Path, face: tuple[Asset, Path]) -> None:
     asset, glb = face
     cameras = five_cameras(SIZE)
-    found, expected = shown(browser, reader, glb, cameras), expected_means(asset, cameras, [FRAME])
+    found, expected = shown(browser, reader, glb, cameras), expected_pictures(asset, cameras, [FRAME], means=True)
     scores = {name: psnr(picture, expected[name, FRAME]) for name, picture in found.items()}
     assert len(scores) == 5 and min(scores.values()) >= AGREE, scores
 

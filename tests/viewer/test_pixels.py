@@ -18,7 +18,7 @@ from facefolds_core.rendering.pixels import lit_hits, render
 from facefolds_core.rendering.raster import cast_layers
 from facefolds_core.rendering.reference import seen_from
 from tests.assets import MOVING, OVER_TORSO, make_asset
-from tests.pictures import GREY, GREY_VALUE, expected_means, expected_pictures, five_cameras, psnr
+from tests.pictures import GREY, GREY_VALUE, expected_pictures, five_cameras, psnr
 from tests.viewer.conftest import NO_WEBCODECS, Player, Show
 from tests.viewer.fixtures import moving_asset, shining
 
@@ -44,7 +44,7 @@ def agrees(player: Player, camera: Camera, expected: NDArray[np.float32]) -> boo
 
 
 def of_pixel_means(asset: Asset, camera: Camera, frame: int = 0) -> NDArray[np.float32]:
-    return expected_means(asset, [camera], [frame])[camera.name, frame]
+    return expected_pictures(asset, [camera], [frame], means=True)[camera.name, frame]
 
 
 @pytest.mark.parametrize(("size", "script"), [(SIZE, ""), (SIZE, NO_WEBCODECS), (96, "")])
@@ -55,7 +55,7 @@ def test_five_cameras_and_three_frames_agree_with_the_reference(
     player = on_grey(show, caps, script=script)
     player.run("e.effects = false")
     cameras, frames = five_cameras(size), (0, caps.num_frames // 2, caps.num_frames - 1)
-    expected = expected_means(caps, cameras, frames)
+    expected = expected_pictures(caps, cameras, frames, means=True)
     for frame in frames:
         assert player.run("return await e.seek(v)", frame)
         for camera in cameras:
@@ -81,9 +81,9 @@ def test_a_machine_that_cannot_draw_it_finer_has_one_ray_a_pixel(show: Show, cap
             return name === this.MAX_RENDERBUFFER_SIZE ? 180 : own.call(this, name); };"""
     player = on_grey(show, caps, script=script)
     assert player.run("return e.statistics.rays") == 1
-    for size, expected in ((96, expected_pictures), (90, expected_means)):
+    for size in (96, 90):
         camera = five_cameras(size)[4]
-        assert agrees(player, camera, expected(caps, [camera], [0])[camera.name, 0])
+        assert agrees(player, camera, expected_pictures(caps, [camera], [0], means=size == 90)[camera.name, 0])
 
 
 def test_the_canvas_shows_what_is_captured(show: Show, caps: Asset) -> None:

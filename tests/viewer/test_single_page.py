@@ -13,7 +13,7 @@ from facefolds_core.asset import read_asset
 from facefolds_core.asset.single_page import write_single_page
 from facefolds_core.cli import app
 from facefolds_core.errors import UserError
-from tests.pictures import GREY, expected_means, five_cameras, psnr
+from tests.pictures import GREY, expected_pictures, five_cameras, psnr
 from tests.streamed import streamed_asset
 from tests.viewer.conftest import Player
 
@@ -43,7 +43,7 @@ def test_one_file_plays_from_the_disk(exported: Callable[[Path], Player], rich: 
     assert out.stat().st_size > sum(size for _, size, _ in read_asset(rich).manifest.full.files()[:3])
     player.run("e.background = v; e.effects = false", GREY)
     camera = five_cameras(160)[0]
-    expected = expected_means(read_asset(rich), [camera], [0])[camera.name, 0]
+    expected = expected_pictures(read_asset(rich), [camera], [0], means=True)[camera.name, 0]
     assert psnr(player.capture(camera)[..., :3], expected) >= 40
     player.run("e.play()")
     player.wait("e.frame > 0")

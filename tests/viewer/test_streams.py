@@ -5,7 +5,6 @@ from __future__ import annotations
 import base64
 import shutil
 import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -17,10 +16,9 @@ from facefolds_core.asset import read_asset
 from tests.pictures import GREY, five_cameras, means_of_frames, psnr
 from tests.scenes import view_of
 from tests.streamed import streamed_asset
-from tests.viewer.conftest import NO_WEBCODECS, NewPlayer, Player, Show
+from tests.viewer.conftest import NO_WEBCODECS, NewPlayer, Show
 from tests.viewer.fixtures import flipped
 
-Opened = Callable[..., Player]
 CAMERA = five_cameras(48)[0]
 DECODERS = pytest.mark.parametrize("script", ["", NO_WEBCODECS], ids=["WebCodecs", "hls.js"])
 FRAMES = 46
@@ -60,23 +58,11 @@ def shows(picture: np.ndarray, pictures: list[np.ndarray], frame: int) -> bool:
     return abs((0.4 * (best - frame) + np.pi) % (2 * np.pi) - np.pi) < 0.15
 
 
-@pytest.fixture
-def opened(show: Show) -> Callable[..., Player]:
-    """On grey, at its full level."""
-
-    def of(asset: Path, **options: object) -> Player:
-        player = show(full=True, asset=asset, **options)
-        player.run("e.background = v", GREY)
-        return player
-
-    return of
-
-
 @DECODERS
 def test_every_seek_shows_the_frame_asked_for(
-    opened: Opened, take: Path, pictures: dict[str, list[np.ndarray]], script: str
+    opened: Show, take: Path, pictures: dict[str, list[np.ndarray]], script: str
 ) -> None:
-    player = opened(take, script=script)
+    player = opened(asset=take, script=script)
     for frame in (FRAMES - 1, 0, 18, 17, 35, 36, 13):
         assert player.run("return await e.seek(v)", frame)
         assert shows(player.capture(CAMERA)[..., :3], pictures["full"], frame)
@@ -104,8 +90,8 @@ RECORD = """
     return seen;"""
 
 
-def test_no_wrong_frame_while_levels_change(opened: Opened, take: Path, pictures: dict[str, list[np.ndarray]]) -> None:
-    player = opened(take)
+def test_no_wrong_frame_while_levels_change(opened: Show, take: Path, pictures: dict[str, list[np.ndarray]]) -> None:
+    player = opened(asset=take)
     seen = player.run(RECORD, view_of(CAMERA))
     assert {level for _, level, _ in seen} == {"small", "full"} and len(seen) > 10
     for frame, level, text in seen:
@@ -115,8 +101,8 @@ def test_no_wrong_frame_while_levels_change(opened: Opened, take: Path, pictures
 
 
 @DECODERS
-def test_playing_goes_over_the_borders_of_segments_and_round(opened: Opened, take: Path, script: str) -> None:
-    player = opened(take, script=script)
+def test_playing_goes_over_the_borders_of_segments_and_round(opened: Show, take: Path, script: str) -> None:
+    player = opened(asset=take, script=script)
     seen = player.run(
         """const seen = [];
         await e.seek(20);
@@ -156,8 +142,8 @@ def test_ten_minutes_start_within_two_seconds(new_player: NewPlayer, ten_minutes
     assert time.monotonic() - started < 2
 
 
-def test_memory_does_not_grow_with_the_take(opened: Opened, ten_minutes: Path) -> None:
-    player = opened(ten_minutes)
+def test_memory_does_not_grow_with_the_take(opened: Show, ten_minutes: Path) -> None:
+    player = opened(asset=ten_minutes)
     session = player.page.context.new_cdp_session(player.page)
 
     def heap() -> float:
@@ -177,17 +163,17 @@ def test_memory_does_not_grow_with_the_take(opened: Opened, ten_minutes: Path) -
     assert heaps[-1] < heaps[0] + 2e6
 
 
-def test_a_segment_that_is_damaged_is_named(opened: Opened, take: Path, tmp_path: Path) -> None:
+def test_a_segment_that_is_damaged_is_named(opened: Show, take: Path, tmp_path: Path) -> None:
     folder = Path(shutil.copytree(take, tmp_path / "asset"))
     for name in ("full.mp4", "small.mp4"):
         (folder / name).write_bytes(flipped((folder / name).read_bytes(), -100))
-    player = opened(folder)
+    player = opened(asset=folder)
     player.run("e.seek(v)", FRAMES - 1)
     assert "is damaged" in player.notice()
 
 
-def test_it_goes_on_when_the_connection_is_back(opened: Opened, ten_minutes: Path) -> None:
-    player = opened(ten_minutes, allow=("ERR_FAILED", "Failed to load"))
+def test_it_goes_on_when_the_connection_is_back(opened: Show, ten_minutes: Path) -> None:
+    player = opened(asset=ten_minutes, allow=("ERR_FAILED", "Failed to load"))
     refuse = lambda route: route.abort()  # noqa: E731
     player.page.route("**/*.mp4", refuse)
     player.run("globalThis.there = e.seek(9000).then((done) => (globalThis.done = done)); return 0")
@@ -211,8 +197,8 @@ def test_a_server_without_byte_ranges_will_do(
     assert shows(player.capture(CAMERA)[..., :3], pictures["full"], 40)
 
 
-def test_the_sound_is_fetched_as_it_is_needed(opened: Opened, take: Path) -> None:
-    player = opened(take)
+def test_the_sound_is_fetched_as_it_is_needed(opened: Show, take: Path) -> None:
+    player = opened(asset=take)
     player.wait("e.player.sound !== null")
     assert not any(url.endswith("audio.mp4") for url in player.requests)
     heard = player.run(

@@ -6,7 +6,6 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +15,7 @@ from facefolds_core.facts import Fact, fact
 from facefolds_core.model.device import CPU
 from facefolds_core.params import ExplicitParams
 from facefolds_core.progress import progress
-from facefolds_core.subject.find import DEFAULT_SUBJECT, found_in, subject_in
+from facefolds_core.subject.find import subject_in
 from facefolds_core.training.checkpoints import fingerprint
 from facefolds_core.training.explicit.cameras import choose_cameras
 from facefolds_core.training.explicit.fit import Fit, fit_scene
@@ -33,14 +32,13 @@ MAX_LOST = 0.05
 
 
 def fit_explicit(scene: Scene, params: ExplicitParams, log: Path) -> Trained:
-    """Train on `scene`.
+    """Train on a scene whose subject was found.
 
     Args:
         log: folder of dvclive's files.
 
     Raises:
-        UserError: if an image or its matte is missing, there is no subject, or training diverges even at small learning
-            rates.
+        UserError: if an image, its matte or the subject is missing, or training diverges even at small learning rates.
     """
     return fit_with_surroundings(scene, params, log)[0]
 
@@ -63,13 +61,6 @@ class Surroundings:
 def fit_with_surroundings(scene: Scene, params: ExplicitParams, log: Path) -> tuple[Trained, Surroundings]:
     """`fit_explicit`, and what else was found out."""
     check_images(scene)
-    with TemporaryDirectory() as folder:
-        scene = found_in(scene, DEFAULT_SUBJECT, Path(folder) / "subject")
-        return _fit(scene, params, log)
-
-
-def _fit(scene: Scene, params: ExplicitParams, log: Path) -> tuple[Trained, Surroundings]:
-    """The same of a scene whose subject was found."""
     began = time.perf_counter()
     with open_log(log) as live:
         bar = progress(total=params.iterations, desc="train", unit="it")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -35,8 +34,6 @@ class TrainingLevel:
         stride: of the pixels that are traced.
         geometry: halfwidths of the layers, in those of the fit.
         last: the learning rates fall along it.
-        pace: factor on all rates, and of steps between smoothings its inverse: below 1 where there are more steps than
-            the way at full rate takes.
     """
 
     texels: tuple[int, int]
@@ -44,12 +41,6 @@ class TrainingLevel:
     stride: int
     geometry: float
     last: bool
-    pace: float = 1.0
-
-    def smooths(self, step: int, every: int) -> bool:
-        """Whether opacity is smoothed after a step: every so many, counted at full rate."""
-        done, before = math.floor(step * self.pace), math.floor((step - 1) * self.pace)
-        return done != before and done % every == 0
 
 
 def epochs(frames: int, random: np.random.Generator) -> Iterator[int]:
@@ -69,9 +60,6 @@ def plan(fit: Fit, params: ExplicitParams, frames: int, pixels: int) -> list[Tra
     Args:
         frames: K.
         pixels: of all training cameras in one frame.
-
-    More steps than those at full rate are smaller ones: they go the same way more finely. Farther on, the layers would
-    begin to show each camera its own picture.
     """
 
     def size(divisor: int) -> tuple[int, int]:
@@ -82,8 +70,7 @@ def plan(fit: Fit, params: ExplicitParams, frames: int, pixels: int) -> list[Tra
     levels = [TrainingLevel(size(4), geometry.round_iterations, stride, scale, False) for scale in geometry.rounds]
     rounds, least = geometry.round_iterations * len(levels), params.textures.steps_per_frame * frames
     rest = max(max(params.iterations, params.least_iterations) - rounds, least)
-    pace = min(1.0, max(params.textures.full_rate_iterations - rounds, least, 1) / rest)
     half = round(HALF_SHARE * rest)
-    levels.append(TrainingLevel(size(2), half, 1, geometry.rounds[-1], False, pace))
-    levels.append(TrainingLevel(fit.texels, max(rest - half, frames), 1, geometry.rounds[-1], True, pace))
+    levels.append(TrainingLevel(size(2), half, 1, geometry.rounds[-1], False))
+    levels.append(TrainingLevel(fit.texels, max(rest - half, frames), 1, geometry.rounds[-1], True))
     return levels

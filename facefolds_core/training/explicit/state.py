@@ -64,14 +64,11 @@ class TextureState:
         shine: (P, 3) what the reflection adds to each ray of the views; (0, 3) where there is none.
         steps: [K] Adam steps on each frame since the grids last grew; their sum is the static part's.
         believed: [M, N] logits of alpha at the start, which steps draw the static ones to; None draws nowhere.
-        pace: share of the way back to what is believed that a step makes (`Level.pace`).
 
     Args:
         start: [rows, columns, 3] colour at the start, over the window with its borders at the first and last rows and
             columns.
     """
-
-    pace = 1.0
 
     def __init__(
         self,
@@ -184,7 +181,7 @@ class TextureState:
             decays(BETAS),
         )
         if self.believed is not None:
-            self.layers[0, ..., 3].lerp_(self.believed, BELIEF * self.pace)
+            self.layers[0, ..., 3].lerp_(self.believed, BELIEF)
         return squares / (3 * len(rays))
 
     def smooth_alpha(self, frame: int) -> None:

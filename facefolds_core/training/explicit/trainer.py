@@ -192,7 +192,6 @@ class Trainer:
         """A level's iterations."""
         assert self.state is not None and self.views is not None
         stride, frames = self._stride(), epochs(self.scene.num_frames, self.random)
-        self.state.pace = level.pace
         coarse = number < len(self.params.geometry.rounds)
         min_alpha = 0.0 if coarse else MIN_ALPHA
         best, recent = math.inf, math.nan
@@ -204,9 +203,9 @@ class Trainer:
             else:
                 self.pictures.shuffle(self.random)
             fall = falling(i / level.iterations if level.last else 0.0)
-            rates = rates_of(level.pace * self.params.textures.learning_rate * fall)
+            rates = rates_of(self.params.textures.learning_rate * fall)
             error = self.state.step(views, rays, self.pictures, frame, min_alpha, rates)
-            if not coarse and level.smooths(i, self.params.textures.smooth_every):
+            if not coarse and i % self.params.textures.smooth_every == 0:
                 self.state.smooth_alpha(frame)
             recent = error if i == 0 else (1 - SMOOTHING) * recent + SMOOTHING * error
             best = min(best, recent)

@@ -7,7 +7,6 @@ import time
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import numba
@@ -24,7 +23,6 @@ from facefolds_core.model.segmented import SegmentedTextures
 from facefolds_core.model.storage import ExplicitSpec
 from facefolds_core.params import ExplicitParams
 from facefolds_core.progress import progress
-from facefolds_core.subject.find import DEFAULT_SUBJECT, found_in
 from facefolds_core.training.checkpoints import fingerprint
 from facefolds_core.training.explicit.loop import fit_explicit
 from facefolds_core.training.explicit.views import check_images
@@ -47,7 +45,7 @@ def train_take(scene: Scene, params: ExplicitParams, folder: Path, checkpoints: 
 
 
 def fit_take(scene: Scene, params: ExplicitParams, checkpoints: Path, log: Path, place: Path | None = None) -> Trained:
-    """Train on a scene of any length.
+    """Train on a scene of any length, whose subject was found.
 
     Args:
         checkpoints: folder in which base and segments of a long take are kept, so that a later training takes them up.
@@ -62,9 +60,7 @@ def fit_take(scene: Scene, params: ExplicitParams, checkpoints: Path, log: Path,
     tqdm.write(f"train: {scene.num_frames} frames {told}")
     if told.key_frames is None:
         return fit_explicit(scene, params, log)
-    with TemporaryDirectory() as found:
-        whole = found_in(scene, DEFAULT_SUBJECT, Path(found) / "subject")
-        return _Take(whole, params, checkpoints / "take", log, told).run()
+    return _Take(scene, params, checkpoints / "take", log, told).run()
 
 
 class _Take:
