@@ -9,9 +9,9 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
+from facefolds_core.cluster.table import Run, figures_of
 from facefolds_core.errors import UserError
 from facefolds_core.params import STAGE_SECTIONS
-from facefolds_core.sweeps.table import Run, figures_of
 
 PARAMS = "params.yaml"
 METRICS = "data/{subject}/metrics.json"

@@ -30,11 +30,11 @@ from bench.results import Row, Store, commit_name, machine_name, now
 from bench.run import own_params
 from bench.tables import AXES, RATES, rate_tables, replace_between, sweep_table
 from facefolds_core.asset import read_asset
+from facefolds_core.cluster.table import Run, write_runs
 from facefolds_core.errors import UserError, report_user_errors
 from facefolds_core.export.sampling import LEAST
 from facefolds_core.rendering.camera_paths import Eye, camera_of, turntable
 from facefolds_core.rendering.opengl import OpenGLRenderer
-from facefolds_core.sweeps.table import Run, write_runs
 
 RESULTS = Path("bench/results/sweeps.json")
 IMAGES = Path("docs/images")

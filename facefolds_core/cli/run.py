@@ -15,10 +15,10 @@ from facefolds_core.cli.mending import mend
 from facefolds_core.cluster.engine import cluster_of, default_jobs, run_jobs
 from facefolds_core.cluster.job import Job, Outcome
 from facefolds_core.cluster.jobs import read_grid, record, subject_jobs, sweep_jobs
+from facefolds_core.cluster.table import Run, figures_of, write_runs
 from facefolds_core.config.params_file import load_params
 from facefolds_core.errors import UserError, report_user_errors
 from facefolds_core.files.writing import write_text
-from facefolds_core.sweeps.table import Run, figures_of, write_runs
 
 LOGS = Path(".dvc", "tmp", "jobs", "logs")
 

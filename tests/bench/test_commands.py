@@ -15,9 +15,9 @@ from bench import hazards, speed_accuracy, sweeps
 from bench.hazard_rows import HAZARDS, Hazard
 from bench.results import Cell, Measurement, Row, Store
 from bench.run import Project
+from facefolds_core.cluster.table import Run
 from facefolds_core.errors import UserError
 from facefolds_core.files.writing import write_json
-from facefolds_core.sweeps.table import Run
 from tests.scoring.fakes import FRAMES, flat_scene, half_mask
 
 

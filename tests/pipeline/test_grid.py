@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from bench.experiments import runs_of
-from facefolds_core.sweeps.table import Run
+from facefolds_core.cluster.table import Run
 from facefolds_core.system.processes import own_environment
 from tests.pipeline.test_dvc_yaml import STAGES
 

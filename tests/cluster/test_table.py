@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from facefolds_core.cluster.table import Run, figures_of, write_runs
 from facefolds_core.errors import UserError
-from facefolds_core.sweeps.table import Run, figures_of, write_runs
-from tests.sweeps.tables import read_runs
+from tests.cluster.tables import read_runs
 
 RUNS = [
     Run(

@@ -10,7 +10,7 @@ import pyarrow as pa
 import pyarrow.csv as pa_csv
 import pyarrow.parquet as pa_parquet
 
-from facefolds_core.sweeps.table import NAMES, Run
+from facefolds_core.cluster.table import NAMES, Run
 
 
 def read_runs(path: Path) -> list[Run]:
