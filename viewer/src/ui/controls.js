@@ -44,15 +44,12 @@ function connectGesturesOf(element) {
   const { player, shadowRoot: root } = element;
   const own = () => element.getAttribute("gestures") === "all" || document.fullscreenElement === element;
   player.view.wheels = () => own() || root.activeElement !== null;
-  const tell = (name, text) => {
-    let told = 0;
-    let last = -Infinity; // times count from the opening of the page
-    player.canvas.addEventListener(name, ({ timeStamp }) => {
-      if (timeStamp - last > AGAIN && told++ < 2) element.overlays.say(text);
-      last = timeStamp;
-    });
-  };
-  tell("unwanted-wheel", "Ctrl + wheel zooms, or click first");
+  let told = 0;
+  let last = -Infinity; // times count from the opening of the page
+  player.canvas.addEventListener("unwanted-wheel", ({ timeStamp }) => {
+    if (timeStamp - last > AGAIN && told++ < 2) element.overlays.say("Ctrl + wheel zooms, or click first");
+    last = timeStamp;
+  });
   if (element.getAttribute("interaction-prompt") === "auto") prompt(element);
   player.canvas.addEventListener("dblclick", ({ clientX, clientY }) => {
     if (!element.hasAttribute("disable-tap") && element.ready)
