@@ -318,7 +318,7 @@ def write_film(path: Path, pictures: Iterator[NDArray[np.uint8]], size: tuple[in
     """H.264 in MP4, BT.709."""
     width = size[0]
     planes = (rgb_to_yuv420(picture) for picture in pictures)
-    planar = (np.concatenate([y, cb.reshape(-1, width), cr.reshape(-1, width)]) for y, cb, cr in planes)
+    planar = (np.concatenate([plane.ravel() for plane in three]).reshape(-1, width) for three in planes)
     codec = CODECS["h264"]
     encode_video(path, planar, size, rate, codec, codec.options(FILM, FILM.crf))
 

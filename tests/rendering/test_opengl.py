@@ -19,7 +19,7 @@ from typer.testing import CliRunner
 from facefolds_core.asset import Asset
 from facefolds_core.asset.manifest_extras import Directions, FilmedView
 from facefolds_core.cli import app
-from facefolds_core.cli.render import Kind, film_path, film_rate, parse_colour, parse_size, shrink
+from facefolds_core.cli.render import Kind, film_path, film_rate, parse_colour, parse_size, shrink, write_film
 from facefolds_core.errors import UserError
 from facefolds_core.rendering.camera_paths import Eye, camera_of, distance_to_fit, fly_through, frame_due, turntable
 from facefolds_core.rendering.opengl import OpenGLRenderer
@@ -176,6 +176,16 @@ def test_films_stay_where_the_asset_was_filmed() -> None:
 )
 def test_the_rate_of_a_film(asset: Fraction, frames: int, wanted: float | None, expected: Fraction) -> None:
     assert film_rate(asset, frames, wanted) == expected
+
+
+@pytest.mark.parametrize("height", [36, 38])
+def test_a_film_may_be_of_any_even_size(height: int, tmp_path: Path) -> None:
+    """Of 38 rows, chroma has 19, which are no whole rows of luma."""
+    picture = np.full((height, 64, 3), (200, 40, 40), np.uint8)
+    write_film(tmp_path / "film.mp4", iter([picture] * 3), (64, height), Fraction(24))
+    with av.open(str(tmp_path / "film.mp4")) as film:
+        seen = [frame.to_ndarray(format="rgb24") for frame in film.decode(video=0)]
+    assert len(seen) == 3 and np.abs(np.array(seen, int) - picture).max() < 12
 
 
 def test_a_film_shows_the_frame_that_a_player_would() -> None:
