@@ -41,6 +41,7 @@ from facefolds_core.scoring.model_view import ModelView
 from facefolds_core.scoring.temporal import Film, change_of
 from facefolds_core.scoring.truths import Truths
 from facefolds_core.training.explicit.loop import fit_explicit
+from facefolds_core.training.explicit.offsets import Offsets
 
 NEVER = 1_000_000
 TRAINING = "facefolds_core.training.explicit"
@@ -63,9 +64,9 @@ def _nothing(*_: object) -> None:
     """In place of a step that is left out."""
 
 
-def _still(radius: np.ndarray, *_: object) -> tuple[np.ndarray, np.ndarray]:
-    """In place of `moves`: no frame's surface lies elsewhere."""
-    return np.zeros_like(radius), np.zeros_like(radius)
+def _still(surface: Offsets, frames: object, halfwidth: np.ndarray) -> tuple[Offsets, np.ndarray]:
+    """In place of `over_frames`: no frame's surface lies elsewhere."""
+    return surface, np.zeros_like(halfwidth)
 
 
 def _no_mesh(*_: object) -> tuple[None, tuple[()]]:
@@ -77,9 +78,9 @@ MECHANISMS: dict[str, Off] = {
     "nothing": Off(),
     "a belt in the chart": Off({"start": {"belts": []}}),
     "tracked mesh": Off(code={f"{TRAINING}.fit:trusted_surface": _no_mesh}),
-    "wider layers where the start is blurred": Off({"geometry": {"max_halfwidth": 0.006}}),
+    "wider layers where the start is blurred": Off({"geometry": {"max_halfwidth": 0.003}}),
     "second surface": Off(code={f"{TRAINING}.second_surface:LEAST_NODES": NEVER}),
-    "layers reach where frames move": Off(code={f"{TRAINING}.fit:moves": _still}),
+    "layers reach where frames move": Off(code={f"{TRAINING}.fit:over_frames": _still}),
     "frames begin where the mesh has moved": Off(code={f"{TRAINING}.teacher:Teacher.moved": _nothing}),
     "views between the cameras": Off(code={"facefolds_core.subject.virtual:FEW": 0}),
     "layers begin as the Gaussians": Off(code={f"{TRAINING}.state:TextureState.fill": _nothing}),

@@ -17,15 +17,8 @@ from facefolds_core.geometry.torso import Torso
 from facefolds_core.model.intersection import Crossings, search_interval
 from facefolds_core.model.radial_kernel import bounds, crossing_distances, heights, placed_points
 
-MIN_SLOPE = 0.1
-"""|d(r - rho) / d distance| is bounded below by this in gradients, as in `intersection`."""
-
 STEP = 0.005
 """Distance between samples of the search, units: a twentieth of a nose."""
-
-DELTA = 1e-4
-"""Half of the distance over which the slope of r - rho along a ray is measured, units: far less than a node of a map,
-far more than what float32 tells apart."""
 
 BISECTIONS = 25
 """Of `STEP`: what is left is less than float32 tells apart."""
@@ -35,50 +28,38 @@ MARGIN = 0.01
 
 
 class RadialManifolds(nn.Module):
-    """rho_i = middle + halfwidth * o_i, with o_1..o_N falling evenly from 1 to -1 (0 if N = 1): nested by construction.
-
-    Both maps are grids over the window whose nodes include its borders: node (0, 0) is at (u1, v0), the top left corner
-    as seen from the front, and values between nodes are bilinear. Outside the window there is no surface. Unlike the
-    MLP's level sets a layer is met from either side: a ray may pass the window's edge and see it from behind, as it
-    would see the exported mesh.
+    """N nested radius maps: grids over the window whose nodes include its borders. Node (0, 0) is at (u1, v0), the top
+    left corner as seen from the front, and values between nodes are bilinear. Outside the window there is no surface.
+    Unlike the MLP's level sets a layer is met from either side: a ray may pass the window's edge and see it from
+    behind, as it would see the exported mesh.
 
     Args:
         chart: where (u, v) and radii lie.
         window: (u0, u1, v0, v1).
-        middle: [rows, columns] radii, units.
-        halfwidth: [rows, columns], positive, units.
-        num_layers: of these.
-        second: [rows, columns, M] radii of layers beneath them, outermost first, 0 where they have no surface.
+        radii: [rows, columns, N], units, outermost first; 0 where a layer has no surface. Layers that have one at every
+            node come first.
         torso: what of them stays in the room while the head turns.
     """
 
     centre: Tensor
-    second: Tensor | None
+    maps: Tensor
 
-    def __init__(
-        self,
-        chart: Chart,
-        window: Window,
-        middle: Tensor,
-        halfwidth: Tensor,
-        num_layers: int,
-        second: Tensor | None = None,
-        torso: Torso | None = None,
-    ) -> None:
+    def __init__(self, chart: Chart, window: Window, radii: Tensor, torso: Torso | None = None) -> None:
         super().__init__()
         self.chart, self.torso = chart, torso
         self.register_buffer("centre", torch.tensor(chart.centre, dtype=torch.float32))
+        self.register_buffer("maps", radii.clone())
         self.window = window
-        self.num_layers = num_layers + (0 if second is None else second.shape[-1])
-        self.middle = nn.Parameter(middle.clone())
-        self.halfwidth = nn.Parameter(halfwidth.clone())
-        self.register_buffer("second", None if second is None else second.clone())
         self._prepared: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None  # radii, their `bounds`, `heights`
+
+    @property
+    def num_layers(self) -> int:
+        return self.maps.shape[-1]
 
     @property
     def radius(self) -> float:
         """Of a ball around c that holds all layers, units."""
-        outermost = (self.middle + self.halfwidth).detach()
+        outermost = self.maps.amax(-1)
         if self.chart.belt is None:
             return float(outermost.max()) + MARGIN
         u0, u1, v0, v1 = self.window
@@ -88,21 +69,16 @@ class RadialManifolds(nn.Module):
         return float((points - self.centre).norm(dim=-1).max()) + MARGIN
 
     def radii(self) -> Tensor:
-        """[rows, columns, N], outermost first; NaN where a layer of the second surface has none."""
-        n = self.num_layers if self.second is None else self.num_layers - self.second.shape[-1]
-        offsets = torch.linspace(1, -1, n) if n > 1 else torch.zeros(1)
-        first = self.middle[..., None] + self.halfwidth[..., None] * offsets.to(self.middle)
-        if self.second is None:
-            return first
-        return torch.cat([first, torch.where(self.second > 0, self.second, torch.nan)], -1)
+        """[rows, columns, N], outermost first; NaN where a layer has no surface."""
+        return torch.where(self.maps > 0, self.maps, torch.nan)
 
     def regularisation(self) -> Tensor:
         """0: they are trained by other means."""
-        return self.middle.new_zeros(())
+        return self.maps.new_zeros(())
 
     def crossings(self, origins: Tensor, directions: Tensor, pose: Similarity | None = None) -> Crossings:
-        """Rays [R, 3] -> nearest crossing with each layer, outermost first. The compiled search where no gradient is
-        asked for on a CPU.
+        """Rays [R, 3] -> nearest crossing with each layer, outermost first, without gradient. The compiled search on a
+        CPU.
 
         Args:
             pose: of the head, which turns over a torso (head -> world); points are those of the layers as made.
@@ -110,7 +86,7 @@ class RadialManifolds(nn.Module):
         bend = self.bend(pose)
         if bend is not None:
             return self._turned(origins, directions, bend)
-        if torch.is_grad_enabled() or origins.device.type != "cpu":
+        if origins.device.type != "cpu":
             return self.reference_crossings(origins, directions)
         offsets = (origins - self.centre).double().numpy()
         distance = torch.from_numpy(self.tracer()(offsets, directions.double().numpy(), None))
@@ -144,7 +120,7 @@ class RadialManifolds(nn.Module):
     def tracer(self) -> Callable[[np.ndarray, np.ndarray, np.ndarray | None], np.ndarray]:
         """A function, prepared for many calls, with the surfaces as they are now: (R, 3) float64 origins minus c,
         directions (R, 3) and a `bend` -> (R, N) float32 distances, 0 where missed."""
-        rho = self.radii().detach().cpu().numpy()
+        rho = self.radii().cpu().numpy()
         window, belt, bound = np.array(self.window), self.chart.numbers, self.radius
         if self._prepared is None or not np.array_equal(self._prepared[0], rho, equal_nan=True):
             self._prepared = rho, bounds(rho), heights(rho, window, belt)
@@ -164,7 +140,7 @@ class RadialManifolds(nn.Module):
         """Directions (u, v) [M, 2] -> rho [M, N], and whether they lie inside the window [M, N]."""
         y, x, inside = self._position(uv)
         n = self.radii().permute(2, 0, 1)[None]
-        rows, columns = self.middle.shape
+        rows, columns = self.maps.shape[:2]
         at = torch.stack([x / (columns - 1), y / (rows - 1)], -1) * 2 - 1
         rho = torch.nn.functional.grid_sample(n, at[None, None].to(n), padding_mode="border", align_corners=True)
         rho = rho[0, :, 0].T
@@ -173,31 +149,15 @@ class RadialManifolds(nn.Module):
     def _position(self, uv: Tensor) -> tuple[Tensor, Tensor, Tensor]:
         """Rows and columns (continuous) of directions (u, v) [..., 2], and whether they lie inside the window."""
         u0, u1, v0, v1 = self.window
-        rows, columns = self.middle.shape
+        rows, columns = self.maps.shape[:2]
         y = (u1 - uv[..., 0]) / (u1 - u0) * (rows - 1)
         x = (uv[..., 1] - v0) / (v1 - v0) * (columns - 1)
         return y, x, (y >= 0) & (x >= 0) & (y <= rows - 1) & (x <= columns - 1)
 
     def reference_crossings(self, origins: Tensor, directions: Tensor) -> Crossings:
-        """The same in torch, differentiable in `middle` and `halfwidth`.
-
-        At the crossing found, d distance / d rho = 1 / (d(r - rho) / d distance), the slope without gradient and
-        bounded away from 0.
-        """
-        rho = self.radii()
-        with torch.no_grad():
-            distance, hit = self._search(rho, origins, directions)
-        points = origins[:, None] + distance[..., None] * directions[:, None]
-        height, _ = self._heights(rho, points)
-        if torch.is_grad_enabled():
-            with torch.no_grad():
-                ahead, _ = self._heights(rho, points + DELTA * directions[:, None])
-                behind, _ = self._heights(rho, points - DELTA * directions[:, None])
-                slope = (ahead - behind) / (2 * DELTA)
-                slope = torch.where(slope < 0, slope.clamp(max=-MIN_SLOPE), slope.clamp(min=MIN_SLOPE))
-            distance = torch.where(hit, distance - (height - height.detach()) / slope, distance)
-            points = origins[:, None] + distance[..., None] * directions[:, None]
-        return Crossings(points, distance, hit)
+        """The same in torch."""
+        distance, hit = self._search(self.radii(), origins, directions)
+        return Crossings(origins[:, None] + distance[..., None] * directions[:, None], distance, hit)
 
     def _search(self, rho: Tensor, origins: Tensor, directions: Tensor) -> tuple[Tensor, Tensor]:
         """First sign change between samples `STEP` apart at most, then `BISECTIONS`. [R, N] distance and hit."""
@@ -230,7 +190,7 @@ class RadialManifolds(nn.Module):
         """
         uv, r = self.chart.uv(points)
         y, x, inside = self._position(uv)
-        rows, columns = self.middle.shape
+        rows, columns = self.maps.shape[:2]
         i = y.floor().clamp(0, rows - 2).long()
         j = x.floor().clamp(0, columns - 2).long()
         a, b = (y - i).clamp(0, 1), (x - j).clamp(0, 1)

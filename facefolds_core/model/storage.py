@@ -92,7 +92,6 @@ class ExplicitSpec(BaseModel):
         nodes: rows and columns of the radius maps.
         texels: H and W of the textures.
         num_layers, num_frames: N and K.
-        second_layers: how many of the N lie on a second surface; absent where there are none.
         reflection: rows and columns of its maps, texels a side of its environment; absent where there is none.
         segments: frames in each file of `segmented.py`; absent where all frames are in model.safetensors.
         fingerprint: of the configuration and scene that it was trained with (training/checkpoints.py).
@@ -101,7 +100,7 @@ class ExplicitSpec(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     format: Literal["facefolds-model"] = "facefolds-model"
-    version: Literal[1] = 1
+    version: Literal[2] = 2
     kind: Literal["explicit"] = "explicit"
     centre: tuple[float, float, float]
     belt: Annotated[Belt | None, AfterValidator(_sound_belt), Field(exclude_if=lambda belt: belt is None)] = None
@@ -111,7 +110,6 @@ class ExplicitSpec(BaseModel):
     texels: tuple[Count, Count]
     num_layers: Annotated[int, Field(ge=1)]
     num_frames: Annotated[int, Field(ge=1)]
-    second_layers: Annotated[int, Field(ge=0, exclude_if=lambda count: count == 0)] = 0
     reflection: Annotated[tuple[Count, Count, Count] | None, Field(exclude_if=lambda shape: shape is None)] = None
     segments: Annotated[
         tuple[Annotated[int, Field(ge=1)], ...] | None, Field(min_length=1, exclude_if=lambda shape: shape is None)
@@ -122,8 +120,6 @@ class ExplicitSpec(BaseModel):
     def _sound(self) -> ExplicitSpec:
         if self.segments is not None and sum(self.segments) != self.num_frames:
             raise ValueError(f"segments of {sum(self.segments)} frames, but num_frames is {self.num_frames}")
-        if self.second_layers >= self.num_layers:
-            raise ValueError(f"second_layers under num_layers, {self.num_layers}")
         return self
 
 
@@ -141,7 +137,6 @@ def build_model(spec: Spec) -> RadianceManifolds:
 
 
 def build_explicit(spec: ExplicitSpec) -> RadianceManifolds:
-    blank = torch.ones(spec.nodes)
     reflection = None
     if spec.reflection is not None:
         rows, columns, environment = spec.reflection
@@ -151,9 +146,8 @@ def build_explicit(spec: ExplicitSpec) -> RadianceManifolds:
         textures = GridTextures(spec.window, spec.texels, spec.num_layers, spec.num_frames, reflection)
     else:
         textures = SegmentedTextures(spec.window, spec.texels, spec.num_layers, spec.segments, reflection)
-    second = torch.ones(*spec.nodes, spec.second_layers) if spec.second_layers else None
-    first = spec.num_layers - spec.second_layers
-    manifolds = RadialManifolds(Chart(spec.centre, spec.belt), spec.window, blank, blank, first, second, spec.torso)
+    blank = torch.ones(*spec.nodes, spec.num_layers)
+    manifolds = RadialManifolds(Chart(spec.centre, spec.belt), spec.window, blank, spec.torso)
     return RadianceManifolds(manifolds, textures)
 
 

@@ -53,11 +53,12 @@ class GeometryParams(Section):
     nodes: Annotated[int, Field(ge=8, le=4096)] = 384
     """Nodes along the longer side of the radius maps."""
 
-    halfwidth: Annotated[float, Field(gt=0, lt=0.2)] = 0.006
-    """The layers lie within this distance of their middle, units, where the start is sharp."""
+    halfwidth: Annotated[float, Field(gt=0, lt=0.2)] = 0.003
+    """The layers lie within this distance of the surface, units, where the start is sharp; within 1.5 pixels
+    where these are larger."""
 
     max_halfwidth: Length = 0.015
-    """Largest distance of a layer from the middle, units."""
+    """Largest distance of a layer from the surface, units."""
 
     rounds: Annotated[Many[Annotated[float, Field(gt=0, le=100)]], Field(min_length=1, max_length=100)] = (
         2.5,

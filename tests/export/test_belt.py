@@ -40,6 +40,7 @@ from facefolds_core.model.storage import ExplicitSpec, build_model
 from facefolds_core.params import ReconstructParams
 from tests.assets import grid_faces
 from tests.export.order import layer_order
+from tests.model.manifolds import layered
 
 CHART = Chart((-0.25, 0.0, 0.05), Belt(0.2, 0.3))
 WINDOW: Window = (-1.0, 0.7, -1.3, 1.3)
@@ -57,8 +58,7 @@ def model(waves: float = 0.0) -> RadianceManifolds:
     assert isinstance(made.manifolds, RadialManifolds)
     u, v = texel_uv(48, 60, WINDOW).transpose(2, 0, 1)
     middle = 0.25 + waves * np.sin(7 * u + 1) * np.cos(5 * v)
-    made.manifolds.middle.data = torch.tensor(middle, dtype=torch.float32)
-    made.manifolds.halfwidth.data.fill_(0.01)
+    made.manifolds.maps = layered(torch.tensor(middle, dtype=torch.float32), 0.01, 2)
     return made
 
 

@@ -1,4 +1,4 @@
-"""Radius maps: closed forms, compiled search against the reference, gradients, the window."""
+"""Radius maps: closed forms, compiled search against the reference, the window."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from facefolds_core.geometry.chart import Chart
 from facefolds_core.geometry.sphere_uv import points_to_uv, uv_to_directions
 from facefolds_core.model.radial import RadialManifolds
 from facefolds_core.model.storage import ExplicitSpec, build_model, load_model, read_spec, save_model
-from tests.model.manifolds import bumpy, check_compiled, check_gradient
+from tests.model.manifolds import bumpy, check_compiled, layered
 
 C = (-0.25, 0.0, 0.0)
 WINDOW = (-0.6, 0.6, -0.6, 0.6)
 
 
 def _spheres(layers: int = 3) -> RadialManifolds:
-    return RadialManifolds(Chart(C), WINDOW, torch.full((24, 20), 0.3), torch.full((24, 20), 0.03), layers)
+    return RadialManifolds(Chart(C), WINDOW, layered(torch.full((24, 20), 0.3), 0.03, layers))
 
 
 def _bumpy() -> RadialManifolds:
@@ -41,11 +41,10 @@ def _distance(origins: torch.Tensor, directions: torch.Tensor, radius: float) ->
     return -b - (b**2 - offset.square().sum(1) + radius**2).sqrt()
 
 
-@pytest.mark.parametrize("grad", [False, True])
-def test_concentric_spheres_in_closed_form(grad: bool) -> None:
+@pytest.mark.parametrize("search", ["crossings", "reference_crossings"])
+def test_concentric_spheres_in_closed_form(search: str) -> None:
     origins, directions = _rays(200)
-    with torch.set_grad_enabled(grad):
-        crossings = _spheres().crossings(origins, directions)
+    crossings = getattr(_spheres(), search)(origins, directions)
     for layer, radius in enumerate((0.33, 0.30, 0.27)):
         expected = _distance(origins, directions, radius)
         hit = crossings.hit[:, layer]
@@ -65,7 +64,7 @@ def test_layers_that_moved_are_met_where_they_are_now() -> None:
     with torch.no_grad():
         before = manifolds.crossings(origins, directions).distance
         for one in (manifolds, moved):
-            one.middle -= 0.05
+            one.maps -= 0.05
         after = manifolds.crossings(origins, directions).distance
         assert torch.equal(after, moved.crossings(origins, directions).distance)
     assert (after > before + 0.01).any()
@@ -81,12 +80,8 @@ def test_there_is_no_surface_outside_the_window() -> None:
     assert not manifolds.crossings(beside, torch.tensor([[-1.0, 0.0, 0.0]])).hit.any()
 
 
-def test_distance_gradient_against_finite_differences() -> None:
-    check_gradient(_bumpy(), *_rays(64, seed=2))
-
-
-def test_one_layer_is_the_middle() -> None:
-    manifolds = _spheres(layers=1)
+def test_one_layer_is_enough() -> None:
+    manifolds = RadialManifolds(Chart(C), WINDOW, torch.full((24, 20, 1), 0.3))
     crossings = manifolds.crossings(torch.tensor([[1.0, 0.0, 0.0]]), torch.tensor([[-1.0, 0.0, 0.0]]))
     assert crossings.distance.item() == pytest.approx(0.95, abs=1e-5)
     assert np.isfinite(crossings.points.detach().numpy()).all()
@@ -96,7 +91,7 @@ def test_radii_in_a_direction_are_where_a_ray_along_it_crosses() -> None:
     torch.manual_seed(0)
     window = (-0.4, 0.5, -0.3, 0.45)
     middle = 0.3 + 0.02 * torch.rand(9, 7)
-    manifolds = RadialManifolds(Chart(C), window, middle, torch.full((9, 7), 0.01), 3)
+    manifolds = RadialManifolds(Chart(C), window, layered(middle, 0.01, 3))
     uv = torch.rand(200, 2) * torch.tensor([0.8, 0.7]) + torch.tensor([-0.35, -0.27])
     uv = torch.cat([uv, torch.tensor([[0.6, 0.0]])])
     radii, valid = manifolds.radii_at(uv)
@@ -112,16 +107,14 @@ def _two_surfaces() -> RadialManifolds:
     """Spheres, and beneath them two more in the upper half of the window only."""
     second = torch.zeros(24, 20, 2)
     second[:12] = torch.tensor([0.2, 0.19])
-    middle, halfwidth = torch.full((24, 20), 0.3), torch.full((24, 20), 0.03)
-    return RadialManifolds(Chart(C), WINDOW, middle, halfwidth, 3, second)
+    return RadialManifolds(Chart(C), WINDOW, torch.cat([layered(torch.full((24, 20), 0.3), 0.03, 3), second], -1))
 
 
-@pytest.mark.parametrize("grad", [False, True])
-def test_a_second_surface_is_met_where_it_is(grad: bool) -> None:
+@pytest.mark.parametrize("search", ["crossings", "reference_crossings"])
+def test_a_second_surface_is_met_where_it_is(search: str) -> None:
     manifolds = _two_surfaces()
     origins, directions = _rays(400, seed=3)
-    with torch.set_grad_enabled(grad):
-        found = manifolds.crossings(origins, directions)
+    found = getattr(manifolds, search)(origins, directions)
     assert found.hit.shape == (400, 5) and manifolds.num_layers == 5
     for layer, radius in enumerate((0.33, 0.30, 0.27, 0.2, 0.19)):
         expected = _distance(origins, directions, radius)
@@ -142,20 +135,12 @@ def test_a_second_surface_has_points_where_it_is() -> None:
     assert radii.isfinite().all()
 
 
-@pytest.mark.parametrize("second", [0, 2])
-def test_a_saved_model_keeps_its_second_surface(second: int, tmp_path: Path) -> None:
-    shape = {"nodes": (24, 20), "texels": (8, 9), "num_frames": 1}
-    spec = ExplicitSpec(centre=C, window=WINDOW, num_layers=3 + second, second_layers=second, **shape)
+def test_a_saved_model_keeps_its_second_surface(tmp_path: Path) -> None:
+    spec = ExplicitSpec(centre=C, window=WINDOW, num_layers=5, nodes=(24, 20), texels=(8, 9), num_frames=1)
     model = build_model(spec)
-    model.manifolds = _two_surfaces() if second else _spheres()
+    model.manifolds = _two_surfaces()
     save_model(model, spec, tmp_path)
-    assert ("second_layers" in (tmp_path / "model.json").read_text()) == bool(second)
     assert read_spec(tmp_path) == spec
     loaded = load_model(tmp_path).manifolds
     assert isinstance(loaded, RadialManifolds)
     torch.testing.assert_close(loaded.radii(), model.manifolds.radii(), rtol=0, atol=0, equal_nan=True)
-
-
-def test_there_is_a_first_surface() -> None:
-    with pytest.raises(ValueError, match="second_layers under num_layers"):
-        ExplicitSpec(centre=C, window=WINDOW, nodes=(8, 8), texels=(8, 8), num_layers=4, num_frames=1, second_layers=4)

@@ -14,6 +14,7 @@ from facefolds_core.geometry.torso import Torso
 from facefolds_core.geometry.track import Track, turn_of
 from facefolds_core.model.radial import RadialManifolds
 from tests.assets import grid_faces
+from tests.model.manifolds import layered
 
 C = (-0.25, 0.0, 0.0)
 WINDOW = (-0.6, 0.6, -0.6, 0.6)
@@ -48,7 +49,7 @@ def bumpy(torso: Torso | None) -> RadialManifolds:
     random = torch.Generator().manual_seed(0)
     coarse = torch.rand(1, 1, 6, 6, generator=random)
     bumps = torch.nn.functional.interpolate(coarse, size=(48, 40), mode="bicubic")[0, 0]
-    return RadialManifolds(Chart(C), WINDOW, 0.25 + 0.1 * bumps, torch.full((48, 40), 0.02), 2, torso=torso)
+    return RadialManifolds(Chart(C), WINDOW, layered(0.25 + 0.1 * bumps, 0.02, 2), torso)
 
 
 def rays(count: int) -> tuple[np.ndarray, np.ndarray]:

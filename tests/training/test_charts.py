@@ -15,7 +15,7 @@ from facefolds_core.geometry.chart import Belt, Chart
 from facefolds_core.params import ExplicitParams
 from facefolds_core.subject import outline
 from facefolds_core.subject.volume import Volume
-from facefolds_core.training.explicit.fit import filmed_around, fit_window, moves
+from facefolds_core.training.explicit.fit import filmed_around, fit_window
 from tests.scenes import look_at_origin
 
 PARAMS = ExplicitParams()
@@ -181,48 +181,3 @@ def test_the_back_of_a_tracked_head_widens_no_window(bust: Volume) -> None:
     alone, tracked = (fit_window(bust, chart, face, mesh, START) for mesh in (None, vertices))
     assert alone[3] < 0.6
     assert -1.1 < tracked[2] < -0.9 and 0.9 < tracked[3] < 1.1  # straight sideways, and the margin
-
-
-def test_layers_reach_as_far_as_the_surface_moves() -> None:
-    """Outwards in one frame, inwards in another; what moves less than the layers lie apart, or is not there, does
-    not."""
-    still = np.full((80, 80), 0.3)
-    open_jaw, closed = still.copy(), still + 0.005
-    open_jaw[10:30, 10:30] += 0.05
-    closed[50:70, 10:30] -= 0.045
-    open_jaw[:, 60:] = np.nan
-    still[:, 50:] = np.nan
-    closed[:, 70:] = 0.9
-    outwards, inwards = moves(still, [open_jaw, closed], np.full((80, 80), 0.006))
-    assert outwards[10:30, 10:30] == pytest.approx(0.044, rel=0.03)
-    assert inwards[50:70, 10:30] == pytest.approx(0.034, rel=0.03)
-    assert outwards[45:].max() == inwards[:35].max() == outwards[:, 50:].max() == inwards[:, 50:].max() == 0
-    assert moves(still, [], np.full((80, 80), 0.006))[0].max() == 0
-
-
-def test_a_stray_in_one_frame_is_no_motion() -> None:
-    still = np.full((80, 80), 0.2)
-
-    def reach(side: int) -> float:
-        strayed = still.copy()
-        strayed[40 : 40 + side, 40 : 40 + side] += 0.1
-        outwards, _ = moves(still, [still, strayed], np.full((80, 80), 0.006))
-        return float(outwards.max())
-
-    assert reach(5) == 0
-    assert reach(8) == pytest.approx(0.094, rel=0.03)
-
-
-def test_an_edge_that_shifts_by_a_node_is_no_way_along_the_ray() -> None:
-    """Its ray meets the surface behind it, which has not moved; an edge that shifts by nine nodes has."""
-    rows = np.arange(80)[:, None] * np.ones(80)
-
-    def edge(row: int) -> np.ndarray:
-        return np.where(rows < row, 0.2, 0.1)
-
-    def reach(shift: int) -> tuple[float, float]:
-        outwards, inwards = moves(edge(40), [edge(40 - shift), edge(40 + shift)], np.full((80, 80), 0.006))
-        return float(outwards.max()), float(inwards.max())
-
-    assert reach(1) == (0, 0)
-    assert reach(9) == pytest.approx((0.094, 0.094), rel=0.03)

@@ -16,6 +16,7 @@ from facefolds_core.model.radial import RadialManifolds
 from facefolds_core.training.explicit.views import MovingRays, Views, first_pixel, trace_views
 from facefolds_core.training.rays import RaySampler
 from tests.geometry.test_track import about
+from tests.model.manifolds import layered
 from tests.scenes import CENTRE, make_scene
 
 WINDOW = (-0.6, 0.6, -0.6, 0.6)
@@ -30,8 +31,8 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Scene:
 
 def layers() -> RadialManifolds:
     """Three spheres' caps around the subject of `make_scene`."""
-    middle, halfwidth = torch.full((9, 9), 0.33), torch.full((9, 9), 0.01)
-    return RadialManifolds(Chart((float(CENTRE[0]), 0.0, 0.0)), WINDOW, middle, halfwidth, 3)
+    radii = layered(torch.full((9, 9), 0.33), 0.01, 3)
+    return RadialManifolds(Chart((float(CENTRE[0]), 0.0, 0.0)), WINDOW, radii)
 
 
 def rays(scene: Scene, stride: int = 1, share: float = 400.0, reserve: float = 0, shares: int = 1000) -> MovingRays:

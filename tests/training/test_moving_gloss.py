@@ -122,7 +122,7 @@ def test_nothing_is_fitted_before_anything_is_opaque(scene: Scene) -> None:
     state = TextureState((8, 8), 3, 6, torch.full((2, 2, 3), 0.5), params())
     source = StillRays(trace_views(scene, layers(), 1))
     gloss = GlossFit(layers().chart, WINDOW, ReflectionParams(texels=4, environment_texels=4), None)
-    gloss.follow(state, source, Noise(), layers().middle.detach())
+    gloss.follow(state, source, Noise(), layers().radii()[..., 1])
     for logit, fitted in ((-5.0, False), (5.0, True)):
         state.layers[0, ..., 3] = logit
         gloss.fit(state, source, Noise(), done=False)

@@ -12,6 +12,7 @@ from facefolds_core.geometry.chart import Chart
 from facefolds_core.subject.volume import Volume
 from facefolds_core.training.explicit.fit import Fit
 from facefolds_core.training.explicit.loop import warnings_of
+from facefolds_core.training.explicit.offsets import Offsets
 from tests.scenes import make_scene
 
 EMPTY = Volume(np.zeros((2, 2, 2, 4), np.float32), np.zeros(3), 1.0)
@@ -20,7 +21,7 @@ BACK, FARTHER = Chart((-0.3, 0.0, 0.0)), Chart((-0.4, 0.0, 0.0))
 WELL = Fit(
     chart=BACK,
     window=(-0.5, 0.5, -0.5, 0.5),
-    middle=np.zeros((2, 2)),
+    offsets=Offsets(np.zeros((2, 2, 2)), np.zeros((2, 2, 2))),
     halfwidth=np.zeros((2, 2)),
     reach=np.zeros((2, 2)),
     second=np.zeros((2, 2)),

@@ -35,6 +35,7 @@ from facefolds_core.subject.sight import seen_by
 from facefolds_core.subject.splats import Splats
 from facefolds_core.subject.storage import FoundSubject
 from facefolds_core.subject.volume import CELLS, COARSE, Volume, volume_of
+from facefolds_core.training.explicit.offsets import Offsets, offsets, over_frames
 from facefolds_core.training.explicit.second_surface import LAYERS, large, second_surface
 from facefolds_core.training.explicit.tracked import (
     FAR,
@@ -54,12 +55,6 @@ FINEST = 0.7
 """Voxels are no smaller than so many pixels of the median camera."""
 LEAST_NODES = 8
 """Rows and columns of the radius maps, at least."""
-MOVES_MARGIN = 4
-"""Nodes of the radius maps around what moves, in which the layers reach as far."""
-SIDEWAYS = 1
-"""Nodes, of 384 a row, by which an edge may shift: a rim that does has not moved from its surface to the one behind."""
-LEAST_MOVED = 30
-"""Nodes of a patch that moves, at least: fewer are strays in one frame, which would be shown as spikes in all."""
 MIN_VIEW_SHARE = 0.06
 """Of the training cameras: what a smaller share sees of a tracked mesh is its word alone."""
 WINDOW_NODES = 192
@@ -71,8 +66,9 @@ LEAST_PATCH = 0.01
 border of the window by half a radian."""
 WINDOW_MARGIN = 0.04
 """Margin of the window in u and v beyond what holds the subject."""
-MAX_HALFWIDTH_PIXELS = 8.0
-"""Largest distance of a layer from the middle, pixels of the median camera; `geometry.halfwidth` is always allowed."""
+HALFWIDTH_PIXELS = 1.5, 8.0
+"""The least and the largest distance of the outermost layer from the surface, pixels of the median camera: photos do
+not show where the surface lies within less. `geometry.halfwidth` is always allowed."""
 RADIUS_QUANTILE = 0.9
 """`textures.pixels_per_texel` holds on a sphere of this quantile of the radii of what is opaque: nearly the farthest,
 where texels are largest."""
@@ -85,9 +81,9 @@ class Fit:
     Attributes:
         chart: of (u, v) and radii.
         window: (u0, u1, v0, v1).
-        middle: starting radii of the middle of the layers, units.
-        halfwidth: half the space between the outermost and the innermost layer, units, where the surface stands still.
-        reach: half of how far it moves beyond that over the frames, units; added to any multiple of the halfwidth.
+        offsets: from the surface about which the layers lie: the mean of a few frames'.
+        halfwidth: distance of the outermost and the innermost layer from it, units, where the surface stands still.
+        reach: how much farther they lie where it moves, units; added to any multiple of the halfwidth.
         second: middle radii of a second surface beneath the first, units; 0 where there is none.
         trust: offsets of the layers from the start are shrunk by this much towards 0, units.
         rgb: of the start, (rows, columns, 3).
@@ -102,7 +98,7 @@ class Fit:
 
     chart: Chart
     window: Window
-    middle: Array
+    offsets: Offsets
     halfwidth: Array
     reach: Array
     second: Array
@@ -150,27 +146,30 @@ def fit_scene(scene: Scene, subject: FoundSubject, params: ExplicitParams, other
         opacity = np.where(np.isfinite(mesh) & np.isnan(seen.radius), np.maximum(opacity, OPACITY), opacity)
         source = fact("middle_from_mesh", reach=REACH)
     middle = extrapolate(known).clip(MIN_RADIUS)
-    most = greatest_halfwidth(geometry, pixel_size(scene))
-    widths = spread(seen, middle, geometry.halfwidth, most, volume.voxel)
-    volumes = [volume_in(scene, splats) for splats in others]
-    radii = [profile(other, chart, uv, start.subject_opacity).radius for other in volumes]
-    outwards, inwards = moves(seen.radius, radii, widths)
-    middle, reach = middle + 0.5 * (outwards - inwards), 0.5 * (outwards + inwards)
-    middle = np.maximum(middle, least_middle(widths, geometry) + reach)
+    least, most = halfwidths(geometry, pixel_size(scene))
+    frames = [seen.radius]
+    for splats in others:
+        radii = profile(volume_in(scene, splats), chart, uv, start.subject_opacity).radius
+        frames.append(np.where(np.isnan(seen.radius), np.nan, radii))
+    surfaces = [middle, *(np.where(np.isnan(radii), middle, radii) for radii in frames)]
+    own, *theirs = offsets(chart, window, surfaces, max(geometry.rounds) * most, volume.voxel)
+    widths = spread(seen, own, least, most, volume.voxel)
+    mean, reach = over_frames(own, list(zip(frames, theirs, strict=True)), widths)
+    mean = mean.through(middle, own.radius(np.zeros_like(middle)), 2 * volume.voxel)
     radius = float(np.quantile(middle[opacity >= start.subject_opacity], RADIUS_QUANTILE))
     texels = texel_count(scene, window, radius, params.textures.pixels_per_texel)
-    second = second_surface(volume, chart, window, middle - widths - reach, cameras)
+    second = second_surface(volume, chart, window, mean.radius(-widths - reach), cameras)
     return Fit(
         chart=chart,
         window=window,
-        middle=middle,
+        offsets=mean,
         halfwidth=widths,
         reach=reach,
         second=second,
         trust=TRUST * kept + reach,
         rgb=seen.rgb.astype(np.float64),
         texels=texels,
-        reasons=(*_reasons(params, losses[chart], source, most, second), *notes),
+        reasons=(*_reasons(params, losses[chart], source, (least, most), second), *notes),
         notes=notes,
         volume=volume,
         losses=losses,
@@ -184,14 +183,16 @@ def volume_in(scene: Scene, splats: Splats, cells: int = CELLS) -> Volume:
     return volume_of(splats, cells, FINEST * pixel_size(scene))
 
 
-def _reasons(params: ExplicitParams, lost: float, middle: Fact, most: float, second: Array) -> tuple[Fact, ...]:
+def _reasons(
+    params: ExplicitParams, lost: float, middle: Fact, widths: tuple[float, float], second: Array
+) -> tuple[Fact, ...]:
     """One a choice."""
-    start, geometry = params.start, params.geometry
+    start, (least, most) = params.start, widths
     return (
         fact("centre_chosen", tie=start.centre_tie, lost=lost),
         fact("window_chosen", opacity=start.subject_opacity, margin=WINDOW_MARGIN),
         middle,
-        fact("halfwidth_chosen", least=geometry.halfwidth, most=most),
+        fact("halfwidth_chosen", least=least, most=most),
         *([fact("second_surface", layers=LAYERS, share=float((second > 0).mean()))] if second.any() else []),
         fact("texels_chosen", pixels=params.textures.pixels_per_texel),
     )
@@ -242,55 +243,24 @@ def fit_window(
     return closed((float(low[0]), float(high[0]), float(low[1]), float(high[1])))
 
 
-def greatest_halfwidth(params: GeometryParams, pixel: float) -> float:
-    """Units; `pixel`: of the median camera at the subject, units."""
-    return max(params.halfwidth, min(params.max_halfwidth, MAX_HALFWIDTH_PIXELS * pixel))
+def halfwidths(params: GeometryParams, pixel: float) -> tuple[float, float]:
+    """The least and the greatest, units; `pixel`: of the median camera at the subject, units."""
+    least = max(params.halfwidth, min(params.max_halfwidth, HALFWIDTH_PIXELS[0] * pixel))
+    return least, max(least, min(params.max_halfwidth, HALFWIDTH_PIXELS[1] * pixel))
 
 
 WIDTH_BLUR = 4.0
 """Smoothing of the halfwidths, standard deviation, nodes: the spread found is noisy, and layers must not be."""
 
 
-def spread(seen: Profile, middle: Array, least: float, most: float, voxel: float) -> Array:
+def spread(seen: Profile, offsets: Offsets, least: float, most: float, voxel: float) -> Array:
     """Halfwidths: the least one, plus half of the spread of the volume's opacity beyond the three voxels that a sharp
-    surface has in it, plus the distance of the middle from the volume's beyond a voxel; smoothed."""
-    thick = np.nan_to_num(0.5 * np.clip(seen.outer - seen.inner - 3 * voxel, 0, None))
-    off = np.nan_to_num(np.clip(np.abs(seen.radius - middle) - voxel, 0, None))
+    surface has in it, plus the distance of the surface from the volume's beyond a voxel; smoothed."""
+    outer, inner, middle = (offsets.distance(radii) for radii in (seen.outer, seen.inner, seen.radius))
+    thick = np.nan_to_num(0.5 * np.clip(outer - inner - 3 * voxel, 0, None))
+    off = np.nan_to_num(np.clip(np.abs(middle) - voxel, 0, None))
     wide: Array = ndimage.gaussian_filter(least + thick + off, WIDTH_BLUR, mode="nearest").clip(least, most)
     return wide
-
-
-def moves(radius: Array, others: Sequence[Array], halfwidth: Array) -> tuple[Array, Array]:
-    """How much farther than a halfwidth the surface goes outwards and inwards in other frames, units.
-
-    Where a jaw opens, a ray meets the neck in one frame and the chin in another, centimetres apart.
-
-    Args:
-        radius: (rows, columns) of the surface in the frame of the start; NaN where there is none.
-        others: the same of other frames.
-        halfwidth: (rows, columns) of the layers there, units.
-
-    Returns:
-        (rows, columns) each, smooth; 0 where no other frame goes beyond a halfwidth, or no surface is known; nor do
-        edges that shift by SIDEWAYS count, or patches of fewer than LEAST_MOVED nodes.
-        On a slope that is SIDEWAYS nodes' rise too little; from the node's own radius the actor lost 0.14 dB.
-    """
-    size, unknown, found = 2 * SIDEWAYS + 1, np.isnan(radius), []
-    highest = ndimage.maximum_filter(np.where(unknown, -np.inf, radius), size, mode="nearest")
-    lowest = ndimage.minimum_filter(np.where(unknown, np.inf, radius), size, mode="nearest")
-    for sign, edge in ((1.0, highest), (-1.0, lowest)):
-        start = np.where(unknown, np.nan, edge)
-        beyond = [np.nan_to_num(sign * (other - start) - halfwidth).clip(0) for other in others]
-        farthest = np.max([np.zeros_like(radius), *beyond], axis=0)
-        farthest = np.where(large(farthest > 0, LEAST_MOVED), farthest, 0)
-        wide = ndimage.maximum_filter(farthest, 2 * MOVES_MARGIN + 1, mode="nearest")
-        found.append(ndimage.gaussian_filter(wide, MOVES_MARGIN / 2, mode="nearest"))
-    return found[0], found[1]
-
-
-def least_middle(halfwidth: Array, params: GeometryParams) -> Array:
-    """The smallest middle radius with which no layer of any round comes nearer to c than `MIN_RADIUS`."""
-    return MIN_RADIUS + max(params.rounds) * halfwidth
 
 
 FILL_BLURS = (32, 16, 8, 4, 2, 1)
@@ -334,25 +304,25 @@ ENOUGH_OPACITY = 0.1
 proportion."""
 
 
-def recentre(radii: Array, alpha: NDArray[np.float32], blur: float) -> Array:
-    """How far the layers should move to lie around the opacity found, along the rays, from outside inwards.
+def recentre(distances: Array, alpha: NDArray[np.float32], blur: float) -> Array:
+    """How far the layers should move outwards to lie around the opacity found.
 
-    With w_i = alpha_i prod_{k<i} (1 - alpha_k), the offset of a node is sum_i w_i (rho_i - middle) / sum_i w_i. It is
+    With w_i = alpha_i prod_{k<i} (1 - alpha_k), the offset of a node is sum_i w_i (d_i - middle) / sum_i w_i. It is
     smoothed with sum_i w_i as the weight, so that transparent directions follow their neighbours and detail of the
     start finer than `blur` is kept.
 
     Args:
-        radii: (rows, columns, N).
+        distances: (rows, columns, N) of the layers from the surface, falling, units.
         alpha: (rows, columns, N) opacity at the same nodes.
         blur: standard deviation of the smoothing, nodes.
 
     Returns:
-        (rows, columns) to be added to the middle radius, units.
+        (rows, columns) to be added to the distances, units.
     """
     weights = (alpha * transmittance_before(alpha, -1)).astype(np.float64)
     mass = weights.sum(-1)
-    middle = 0.5 * (radii[..., 0] + radii[..., -1])
-    moment = (weights * (radii - middle[..., None])).sum(-1)
+    middle = 0.5 * (distances[..., 0] + distances[..., -1])
+    moment = (weights * (distances - middle[..., None])).sum(-1)
     moved = np.zeros_like(middle)
     for scale in RECENTRE_SCALES:
         near = ndimage.gaussian_filter(mass, scale * blur, mode="nearest")

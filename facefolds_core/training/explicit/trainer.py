@@ -21,7 +21,7 @@ from facefolds_core.params import ExplicitParams
 from facefolds_core.subject.outline import texel_middles
 from facefolds_core.subject.volume import Volume
 from facefolds_core.training.explicit.cameras import CameraChoice
-from facefolds_core.training.explicit.fit import Fit, least_middle, recentre, volume_in
+from facefolds_core.training.explicit.fit import Fit, recentre, volume_in
 from facefolds_core.training.explicit.follow import follow, follow_rates
 from facefolds_core.training.explicit.gloss import GlossFit
 from facefolds_core.training.explicit.plan import SETTLING, TrainingLevel, epochs
@@ -66,7 +66,7 @@ class Trainer:
         self.pictures, self.teacher = pictures, teacher
         self.random = np.random.default_rng(params.seed)
         self.layers = params.layers + (LAYERS if fit.second.any() else 0)
-        self.middle = torch.from_numpy(fit.middle).float()
+        self.shift = np.zeros_like(fit.halfwidth)
         self.geometry = 0.0
         self.views: RaySource | None = None
         self.stride = 0
@@ -78,18 +78,23 @@ class Trainer:
         self.gloss = GlossFit(fit.chart, fit.window, params.reflection, cameras.scene.poses, photographed=real)
         self.usual = np.zeros((0, 3), np.float32)
 
-    def manifolds(self) -> RadialManifolds:
-        halfwidth, reach = (torch.from_numpy(part).float() for part in (self.fit.halfwidth, self.fit.reach))
-        halfwidth = self.geometry * halfwidth + reach
-        inner = (self.middle - halfwidth).numpy().astype(np.float64)
-        second = torch.from_numpy(second_layers(self.fit.second, inner)) if self.layers > self.params.layers else None
-        return self._layers(self.middle, halfwidth, self.params.layers, second)
+    def distances(self) -> NDArray[np.float64]:
+        """(rows, columns, N) of the first surface's layers from the surface of the fit, falling, units."""
+        halfwidth = self.geometry * self.fit.halfwidth + self.fit.reach
+        return self.shift[..., None] + halfwidth[..., None] * np.linspace(1, -1, self.params.layers)
 
-    def _layers(
-        self, middle: torch.Tensor, halfwidth: torch.Tensor, count: int, second: torch.Tensor | None
-    ) -> RadialManifolds:
-        fit = self.fit
-        return RadialManifolds(fit.chart, fit.window, middle, halfwidth, count, second, fit.torso)
+    def manifolds(self) -> RadialManifolds:
+        radii = self.fit.offsets.layers(self.distances())
+        if self.layers > self.params.layers:
+            radii = np.concatenate([radii, second_layers(self.fit.second, radii[..., -1])], -1)
+        return self._manifolds(torch.from_numpy(radii).float())
+
+    def _manifolds(self, radii: torch.Tensor) -> RadialManifolds:
+        return RadialManifolds(self.fit.chart, self.fit.window, radii, self.fit.torso)
+
+    def middle(self) -> NDArray[np.float64]:
+        """(rows, columns) radii of the surface that the layers lie about, units."""
+        return self.fit.offsets.radius(self.shift)
 
     def run(self, level: TrainingLevel, number: int, live: Live, bar: tqdm) -> None:
         """One level.
@@ -129,7 +134,7 @@ class Trainer:
             self.state.grow(level.texels)
         self._begin_with_subject(begun or moved, colours=begun)
         if new_rays:
-            self.gloss.follow(self.state, self.views, self.pictures, self.middle)
+            self.gloss.follow(self.state, self.views, self.pictures, torch.from_numpy(self.middle()).float())
 
     def _trace(self, level: TrainingLevel) -> None:
         finest = level.texels if level.stride > 1 else self.fit.texels
@@ -147,7 +152,7 @@ class Trainer:
         assert self.state is not None
         shape = self.state.shape
         with on_one_thread():
-            nodes = self.manifolds().radii().detach().permute(2, 0, 1)[None]
+            nodes = self.manifolds().radii().permute(2, 0, 1)[None]
             radii = torch.nn.functional.interpolate(nodes, size=shape, mode="bilinear", align_corners=False)
         places, uv = radii[0].permute(1, 2, 0).double().numpy(), texel_middles(self.fit.window, *shape)
         flat = shape[0] * shape[1], places.shape[-1]
@@ -167,7 +172,7 @@ class Trainer:
                     self.state.fill_frame(frame, opacity, rgb if colours else None)
 
     def _recentre(self) -> None:
-        """Move the middle radius to where this round found opacity, mean over frames."""
+        """Move the layers to where this round found opacity, mean over frames."""
         assert self.state is not None
         h, w = self.state.shape
         n = self.params.layers
@@ -175,18 +180,11 @@ class Trainer:
         alpha = torch.stack([self.state.activated(k)[:, :n, 3].clone() for k in frames]).mean(0)
         seen = self.state.layers[2, :, :n, 3] > 0
         alpha = torch.where(seen, alpha, 0.0).view(1, h, w, -1).permute(0, 3, 1, 2)
-        size = self.middle.shape[0], self.middle.shape[1]
         with on_one_thread():
-            nodes = torch.nn.functional.interpolate(alpha, size=size, mode="bilinear", align_corners=False)
-        radii = self.manifolds().radii().detach().double().numpy()[..., :n]
-        offsets = recentre(radii, nodes[0].permute(1, 2, 0).numpy(), self.params.geometry.blur)
-        moved = self.middle + torch.from_numpy(offsets).float()
-        start = torch.from_numpy(self.fit.middle).float()
+            nodes = torch.nn.functional.interpolate(alpha, size=self.shift.shape, mode="bilinear", align_corners=False)
+        found = recentre(self.distances(), nodes[0].permute(1, 2, 0).numpy(), self.params.geometry.blur)
         # Where hardly anything is opaque a direction may drift: not to c, where the search for crossings ends.
-        moved = start + _shrink(moved - start, torch.from_numpy(self.fit.trust).float())
-        self.middle = torch.maximum(
-            moved, torch.from_numpy(least_middle(self.fit.halfwidth, self.params.geometry) + self.fit.reach).float()
-        )
+        self.shift = _shrink(self.shift + found, self.fit.trust)
 
     def _step(self, level: TrainingLevel, number: int, live: Live, bar: tqdm) -> None:
         """A level's iterations."""
@@ -241,15 +239,9 @@ class Trainer:
         state = self.state
         state.forget_moments()
         state.clear()
-        above, below = self._kept_layers(state)
-        first, last, stay = above[0], above[-1], [*above, *below]
-        radii = self.manifolds().radii().detach()
-        outer, inner = radii[..., first], radii[..., last]
+        stay = self._kept_layers(state)
         h, w = state.shape
-        halfwidth = (0.5 * (outer - inner)).clamp(min=1e-6)
-        second = radii[..., below].nan_to_num() if below else None
-        middle = 0.5 * (outer + inner)
-        manifolds = self._layers(middle, halfwidth, last - first + 1, second)
+        manifolds = self._manifolds(self.manifolds().maps[..., stay])
         reflection = self.gloss.model()
         textures = GridTextures(self.fit.window, (h, w), len(stay), self.scene.num_frames, reflection)
         with torch.no_grad():
@@ -262,32 +254,30 @@ class Trainer:
             belt=self.fit.chart.belt,
             torso=self.fit.torso,
             window=self.fit.window,
-            nodes=(self.middle.shape[0], self.middle.shape[1]),
+            nodes=(self.shift.shape[0], self.shift.shape[1]),
             texels=(h, w),
             num_layers=len(stay),
             num_frames=self.scene.num_frames,
-            second_layers=len(below),
             reflection=None if reflection is None else (*reflection.shape.maps, reflection.shape.environment),
             fingerprint=fingerprint,
         )
         return RadianceManifolds(manifolds, textures), spec
 
-    def _kept_layers(self, state: TextureState) -> tuple[list[int], list[int]]:
-        """Those of the first and of the second surface without what shows nothing. Layers stay where they are: the
-        first surface's must still be evenly spaced, so only outer and inner ones go."""
+    def _kept_layers(self, state: TextureState) -> list[int]:
+        """All but those that show nothing; one of the first surface stays."""
         peak = torch.stack([state.activated(k)[..., 3].amax(0).clone() for k in range(self.scene.num_frames)]).amax(0)
         shows, n = (peak >= LAYER_ALPHA).tolist(), self.params.layers
         kept = [i for i in range(n) if shows[i]] or [n // 2]
-        above, below = list(range(kept[0], kept[-1] + 1)), [i for i in range(n, self.layers) if shows[i]]
-        gone = sorted(set(range(self.layers)) - {*above, *below})
+        kept += [i for i in range(n, self.layers) if shows[i]]
+        gone = sorted(set(range(self.layers)) - set(kept))
         self.events += [fact("layer_dropped", layer=i, alpha=float(peak[i])) for i in gone]
-        return above, below
+        return kept
 
     def summary(self, spec: ExplicitSpec) -> dict[str, Any]:
         """`fit.json`: what was chosen, and why."""
         return {
             "window": list(spec.window),
-            "middle_radius": {"least": float(self.middle.min()), "greatest": float(self.middle.max())},
+            "middle_radius": {"least": float(self.middle().min()), "greatest": float(self.middle().max())},
             "centre": list(spec.centre),
             "belt": None if spec.belt is None else spec.belt.degrees,
             "halfwidth": {"least": float(self.fit.halfwidth.min()), "greatest": float(self.fit.halfwidth.max())},
@@ -310,6 +300,6 @@ def _diverged(number: int, level: TrainingLevel, rate: float) -> UserError:
     )
 
 
-def _shrink(values: torch.Tensor, by: torch.Tensor) -> torch.Tensor:
+def _shrink(values: NDArray[np.float64], by: NDArray[np.float64]) -> NDArray[np.float64]:
     """Towards 0 by `by`, not beyond."""
-    return values.sign() * (values.abs() - by).clamp(min=0)
+    return np.asarray(np.sign(values) * np.clip(np.abs(values) - by, 0, None))
