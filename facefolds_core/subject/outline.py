@@ -100,12 +100,17 @@ def grid_shape(window: Window, longest: int, least: int) -> tuple[int, int]:
     return max(least, round(scale * (u1 - u0))), max(least, round(scale * (v1 - v0)))
 
 
+def node_positions(uv: Array, window: Window, shape: tuple[int, ...]) -> tuple[Array, Array]:
+    """(u, v) (..., 2) -> rows and columns (...), continuous, of a grid (rows, columns) as of `window_uv`."""
+    u0, u1, v0, v1 = window
+    return (u1 - uv[..., 0]) / (u1 - u0) * (shape[0] - 1), (uv[..., 1] - v0) / (v1 - v0) * (shape[1] - 1)
+
+
 def nodes_at(uv: Array, window: Window, shape: tuple[int, ...]) -> tuple[NDArray[np.intp], NDArray[np.intp], Bool]:
     """Rows (P,) and columns (P,) of the nodes, of a grid (rows, columns) as of `window_uv`, that are nearest to (u, v)
     (P, 2); and whether these lie within the window."""
-    u0, u1, v0, v1 = window
     last = shape[0] - 1, shape[1] - 1
-    i, j = (u1 - uv[:, 0]) / (u1 - u0) * last[0], (uv[:, 1] - v0) / (v1 - v0) * last[1]
+    i, j = node_positions(uv, window, shape)
     within = (i >= 0) & (i <= last[0]) & (j >= 0) & (j <= last[1])
     row, column = (np.rint(at).astype(np.intp).clip(0, most) for at, most in zip((i, j), last, strict=True))
     return row, column, np.asarray(within)

@@ -17,7 +17,7 @@ from scipy import ndimage
 
 from facefolds_core.geometry.chart import Chart
 from facefolds_core.geometry.sphere_uv import Window
-from facefolds_core.subject.outline import MIN_RADIUS, window_uv
+from facefolds_core.subject.outline import MIN_RADIUS, node_positions, window_uv
 from facefolds_core.training.explicit.second_surface import large
 
 Array = NDArray[np.float64]
@@ -123,8 +123,7 @@ def distance_grid(
     along, square = (away * normal).sum(-1), (away**2).sum(-1)
     aside = np.maximum(square - along**2 - voxel**2, 0)
     uv, radius = chart.uv(voxels)
-    last, (u0, u1, v0, v1) = np.array(surface.shape) - 1, window
-    nodes = (u1 - uv[..., 0]) / (u1 - u0) * last[0], (uv[..., 1] - v0) / (v1 - v0) * last[1]
+    nodes = node_positions(uv, window, surface.shape)
     outside = radius - ndimage.map_coordinates(surface, nodes, order=1, mode="nearest")
     side = np.where(square < voxel**2, along, outside)
     return np.asarray(np.copysign(np.sqrt(along**2 + aside), side), np.float32)
