@@ -8,6 +8,7 @@ import threading
 import webbrowser
 from pathlib import Path
 from typing import Annotated
+from urllib.parse import urlencode
 
 import typer
 
@@ -63,9 +64,11 @@ def command(
 ) -> None:
     """Serve an asset and the web player to this machine only, and open the player. Ctrl+C ends it."""
     with report_user_errors("view"):
-        folder = (asset_folder(asset) if asset else latest_asset(data)).resolve()
+        named = asset_folder(asset) if asset else latest_asset(data)
+        folder = named.resolve()
         parse_manifest(folder / MANIFEST_NAME)
-        with serving(find_player(), {"asset": folder}, port) as address:
+        with serving(find_player(), {"asset": folder}, port) as root:
+            address = f"{root}?{urlencode({'folder': named.as_posix()}, safe='/')}"
             typer.echo(f"view: {folder}\nview: {address}  (Ctrl+C ends)")
             if browser and has_screen():
                 webbrowser.open(address)

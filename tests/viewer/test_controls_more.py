@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import io
+import shlex
 from itertools import pairwise
 from pathlib import Path
 
@@ -120,6 +121,10 @@ def test_the_code_to_embed_plays(player: Player) -> None:
     assert player.page.get_by_text("Only this machine can reach").is_visible()
     command = "facefolds export-html data/caps/asset --out caps.html"
     assert player.page.get_by_label("One file").input_value() == command  # what a shell takes, and nothing else
+    player.run("e.setAttribute('folder', v)", "data/ann's takes/asset")
+    player.run("e.openEmbed()")
+    quoted = player.page.get_by_label("One file").input_value().removeprefix("facefolds export-html ")
+    assert shlex.split(quoted) == ["data/ann's takes/asset", "--out", "caps.html"]
     assert player.page.get_by_label("and this code plays it").input_value().startswith('<iframe src="caps.html"')
     hidden = "[...e.shadowRoot.querySelectorAll('textarea')].filter((one) => one.scrollHeight > one.clientHeight)"
     assert player.run(f"return {hidden}.length") == 0

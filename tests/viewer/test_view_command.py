@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
+from urllib.parse import urljoin
 
 import pytest
 from playwright.sync_api import Page
@@ -72,7 +73,7 @@ def test_it_serves_until_it_is_interrupted(tmp_path: Path, player_folder: Path, 
     make_asset(tmp_path / "some" / "asset", layers=1, frames=1, resolution=32)
     with viewing("--data", str(tmp_path), within=project_root) as (address, process):
         for path in ("", "asset/manifest.json"):
-            with urllib.request.urlopen(address + path, timeout=10) as response:
+            with urllib.request.urlopen(urljoin(address, path), timeout=10) as response:
                 assert response.status == 200
         process.send_signal(signal.SIGINT)
         assert process.wait(timeout=20) == 0
@@ -89,4 +90,5 @@ def test_what_it_serves_is_shown(
     with viewing(str(tmp_path / name), within=project_root) as (address, _):
         page.goto(address)
         page.wait_for_function(f"() => {ELEMENT}?.ready", timeout=PATIENCE)
+        assert page.evaluate(f"() => {ELEMENT}.getAttribute('folder')") == str(tmp_path / "asset")  # for commands
     assert said == []

@@ -3,6 +3,18 @@
 const ASIDE = { azimuth: 62, elevation: 8 }; // degrees: from where layers that are pulled apart are seen
 const ACROSS = { azimuth: 28, elevation: 26 }; // the same where the canvas is tall: their row goes up the picture
 
+const SMALL = 0.5; // of the largest layer's area: what has less lies beneath others in places only, and would be scraps by itself
+
+/**
+ * Places in the row of layers: small ones stay with the one before them.
+ * @param {number[]} areas of all layers @returns {number[]} of each layer, from 0
+ */
+export function placesInRow(areas) {
+  const least = SMALL * Math.max(...areas);
+  let last = -1;
+  return areas.map((area) => (last = area >= least ? last + 1 : Math.max(last, 0)));
+}
+
 export class Apart {
   /** @param {import("./player.js").Player} player */
   constructor(player) {

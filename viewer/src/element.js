@@ -248,7 +248,6 @@ export class FacefoldsPlayer extends PlayerApi {
     this.paint = painted(colours?.[0] ?? colour, stage);
     stage.style.backgroundImage = colours ? backdropImage(colour) : "";
     stage.classList.toggle("light", isLight(this.paint, this));
-    stage.classList.toggle("clear", this.paint[3] < 1);
     this.#player?.set("background", this.paint);
     this.#player?.set("backdrop", colours?.map(numbersOf) ?? null);
     const asked = parseFloat(this.getAttribute("shadow-intensity"));

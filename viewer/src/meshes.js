@@ -4,7 +4,7 @@ import { PlayerError } from "./errors.js";
 
 /**
  * @typedef {{index: Uint16Array | Uint32Array, position: Float32Array, uv: Float32Array,
- *   box: {low: number[], high: number[]}}} Geometry
+ *   box: {low: number[], high: number[]}, area: number}} Geometry
  * @param {ArrayBuffer} buffer handed over: not to be used afterwards
  * @param {import("./manifest.js").LayerEntry} layer what it must hold
  * @param {string} file its address, for messages
@@ -25,7 +25,19 @@ export async function decodeMesh(buffer, layer, file) {
     const wanted = `${layer.vertices} and ${layer.triangles}`;
     throw damaged(layer, file, `${vertices} vertices and ${triangles} triangles instead of ${wanted}`);
   }
-  return { index: vertices <= 65536 ? Uint16Array.from(index) : index, position, uv, box: boxOf(position) };
+  const short = vertices <= 65536 ? Uint16Array.from(index) : index;
+  return { index: short, position, uv, box: boxOf(position), area: areaOf(index, position) };
+}
+
+function areaOf(index, position) {
+  let twice = 0;
+  for (let i = 0; i < index.length; i += 3) {
+    const [a, b, c] = [0, 1, 2].map((k) => position.subarray(3 * index[i + k], 3 * index[i + k] + 3));
+    const [x, y, z] = b.map((v, k) => v - a[k]);
+    const [u, v, w] = c.map((v, k) => v - a[k]);
+    twice += Math.hypot(y * w - z * v, z * u - x * w, x * v - y * u);
+  }
+  return twice / 2;
 }
 
 function boxOf(position) {

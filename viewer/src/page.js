@@ -1,4 +1,4 @@
-/** The full page: index.html?src=FOLDER#VIEW. The address follows the view; keys that nobody else takes are the player's. */
+/** The full page: index.html?src=FOLDER&folder=PATH#VIEW; the path is where the asset lies on this machine, for commands. The address follows the view; keys that nobody else takes are the player's. */
 import "./index.js";
 import { acceptDrops } from "./ui/drop.js";
 import { decode, encode } from "./viewstate.js";
@@ -11,6 +11,7 @@ if (parent === window) player.setAttribute("gestures", "all"); // in a frame the
 acceptDrops(player);
 player.state = decode(location.hash);
 player.setAttribute("src", given.get("src") ?? "asset/");
+if (given.has("folder")) player.setAttribute("folder", given.get("folder"));
 if (given.has("controls")) player.setAttribute("controls", given.get("controls"));
 
 let timer = 0;

@@ -6,6 +6,7 @@
  * Stored values are blended as they are: no colour management, no tone mapping, no sRGB textures.
  * A pixel is the mean of SIDE x SIDE rays: the picture is drawn SIDE times as large, and averaged.
  */
+import { placesInRow } from "./apart.js";
 import { Graphics, SIDE } from "./gl/graphics.js";
 import { Target } from "./gl/target.js";
 import { Upload } from "./gl/upload.js";
@@ -32,6 +33,7 @@ export class LayerRenderer {
     this.effectsOn = true;
     this.wireframe = false;
     this.spread = 0;
+    this.places = [0]; // of the layers in the row when they are pulled apart
     this.kind = "colour";
     this.range = null; // distances from the eye that are shown bright and dark, for depth; null: of all there is
     this.background = [0, 0, 0, 1];
@@ -77,6 +79,7 @@ export class LayerRenderer {
     this.level = level;
     const ends = level.geometries.flatMap(({ box }) => [box.low[2], box.high[2]]);
     this.tall = Math.max(...ends) - Math.min(...ends);
+    this.places = placesInRow(level.geometries.map(({ area }) => area));
     this.upload = new Upload(this.graphics.gl, level);
   }
 
@@ -144,8 +147,10 @@ export class LayerRenderer {
   }
 
   #shift(index) {
-    const middle = (this.level.geometries.length - 1) / 2;
-    return this.spread * this.tall * Math.min(SPREAD.step, SPREAD.all / (2 * middle || 1)) * (middle - index);
+    const middle = this.places.at(-1) / 2;
+    return (
+      this.spread * this.tall * Math.min(SPREAD.step, SPREAD.all / (2 * middle || 1)) * (middle - this.places[index])
+    );
   }
 
   /**

@@ -12,6 +12,9 @@ export function linkTo(element) {
 /** Whether only this machine can reach an address: what `facefolds view` serves. */
 export const isOwn = (address) => /^(localhost|127\..*|\[::1\])$/.test(new URL(address).hostname);
 
+/** A path as a shell's one word. */
+const shellQuoted = (path) => (/^[\w./~-]+$/.test(path) ? path : `'${path.replace(/'/g, "'\\''")}'`);
+
 /**
  * HTML for a page of somebody else's. An address of this machine would be of no use there: then for the player and the
  * asset uploaded beside the page, and for one file.
@@ -28,7 +31,7 @@ export function embedCode(element) {
   const frame = (address) =>
     `<iframe src="${quoted(address)}" title="${name}" width="640" height="480" style="border: 0" loading="lazy" allow="fullscreen; clipboard-write"></iframe>`;
   return {
-    command: `facefolds export-html data/${name}/asset --out ${name}.html`,
+    command: `facefolds export-html ${shellQuoted(element.getAttribute("folder") ?? `data/${name}/asset`)} --out ${name}.html`,
     page: frame(`${name}.html`),
     frame: frame(link),
     element: `<script type="module" src="${quoted(script)}"></script>\n<facefolds-player src="${quoted(source)}" loading="lazy" style="height: 480px"></facefolds-player>`,

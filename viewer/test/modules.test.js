@@ -4,6 +4,7 @@ import { Matrix4, Vector3, Vector4 } from "three";
 import { fitted, orbitView, positionOf, projectionOf, viewOf } from "../src/camera.js";
 import { eyeOf, transformed } from "../src/matrices.js";
 import { fieldOfView, orbitOf } from "../src/attributes.js";
+import { placesInRow } from "../src/apart.js";
 import { Adaptation } from "../src/adapt.js";
 import { bounded, hemsFrom, resisted, strength, unwound } from "../src/limits.js";
 import { parseManifest } from "../src/manifest.js";
@@ -32,6 +33,11 @@ test("a point lands on the pixel that K and w2c say", () => {
   near(((clip.x / clip.w + 1) / 2) * W, fit.x + fit.scale * pixel[0]);
   near(((1 - clip.y / clip.w) / 2) * H, fit.y + fit.scale * pixel[1]);
   near(clip.w, z);
+});
+
+test("scraps stay with the layer before them when layers are pulled apart", () => {
+  assert.deepEqual(placesInRow([10, 9, 8, 3, 2]), [0, 1, 2, 2, 2]);
+  assert.deepEqual(placesInRow([3, 10]), [0, 1]);
 });
 
 test("near and far planes go to the ends of the depth range", () => {
