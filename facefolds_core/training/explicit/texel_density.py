@@ -18,7 +18,7 @@ from facefolds_core.geometry.warp import evened
 
 Array = NDArray[np.float64]
 
-DENSITIES = 0.35, 3.0
+DENSITIES = 0.5, 2.0
 """The least and the greatest area of a cell, in those of the median one, that count: what is seen from aside alone, as
 most walls are, need not have all that it covers."""
 SURFACE_BLUR = 1.0
