@@ -136,13 +136,13 @@ def fit_scene(scene: Scene, subject: FoundSubject, params: ExplicitParams, other
     vertices = None if surface is None else surface[0].astype(np.float64)
     window = fit_window(coarse, chart, visible, vertices, start, around)
     rows, columns = grid_shape(window, geometry.nodes, LEAST_NODES)
-    by_angle = surface_at(volume, chart, window_uv(window, -(-rows // 2), -(-columns // 2)), cameras, surface, start)
+    by_angle = surface_map(volume, chart, window_uv(window, -(-rows // 2), -(-columns // 2)), cameras, surface, start)
     there = by_angle.opacity >= start.subject_opacity
     radius = float(np.quantile(by_angle.middle[there], RADIUS_QUANTILE))
     texels = texel_count(scene, window, radius, params.textures.pixels_per_texel)
     chart = with_even_texels(chart, window, by_angle.middle, there)
     uv = window_uv(window, rows, columns)
-    first = surface_at(volume, chart, uv, cameras, surface, start)
+    first = surface_map(volume, chart, uv, cameras, surface, start)
     seen, middle = first.seen, first.middle
     least, most = halfwidths(geometry, pixel_size(scene))
     frames = [seen.radius]
@@ -175,7 +175,7 @@ def fit_scene(scene: Scene, subject: FoundSubject, params: ExplicitParams, other
 
 
 @dataclass(frozen=True)
-class Surface:
+class SurfaceMap:
     """What layers are to lie about, at nodes (rows, columns) of a chart.
 
     Attributes:
@@ -193,27 +193,27 @@ class Surface:
     source: Fact
 
 
-def surface_at(
+def surface_map(
     volume: Volume,
     chart: Chart,
     uv: Array,
     cameras: Sequence[Camera],
     mesh: tuple[NDArray[np.float32], NDArray[np.int32]] | None,
     start: StartParams,
-) -> Surface:
+) -> SurfaceMap:
     """From the volume, and from a tracked mesh (vertices and faces) that is trusted, at (u, v) (rows, columns, 2)."""
     seen = profile(volume, chart, uv, start.subject_opacity)
     opacity = seen.opacity.astype(np.float64)
     if mesh is None:
         middle = extrapolate(seen.radius).clip(MIN_RADIUS)
-        return Surface(seen, middle, np.zeros(middle.shape), opacity, fact("middle_from_volume"))
+        return SurfaceMap(seen, middle, np.zeros(middle.shape), opacity, fact("middle_from_volume"))
     tracked = mesh_radii(mesh[0].astype(np.float64), mesh[1], chart, uv)
     share = seen_by(cameras, chart.points(uv, tracked).reshape(-1, 3)).reshape(tracked.shape) / len(cameras)
     unseen = (share < MIN_VIEW_SHARE) & np.isfinite(tracked)
     seen = replace(seen, radius=np.where(unseen, np.nan, seen.radius))
     known, kept = blend(tracked, seen.radius, np.where(share < WELL_SEEN, FAR, REACH))
     opacity = np.where(np.isfinite(tracked) & np.isnan(seen.radius), np.maximum(opacity, OPACITY), opacity)
-    return Surface(seen, extrapolate(known).clip(MIN_RADIUS), kept, opacity, fact("middle_from_mesh", reach=REACH))
+    return SurfaceMap(seen, extrapolate(known).clip(MIN_RADIUS), kept, opacity, fact("middle_from_mesh", reach=REACH))
 
 
 def volume_in(scene: Scene, splats: Splats, cells: int = CELLS) -> Volume:

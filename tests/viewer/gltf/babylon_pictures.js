@@ -32,6 +32,7 @@ const placed = ([x, y, z]) => new Vector3(-y, z, x);
 export async function shown({ canvas, engine, scene }, cameras, background) {
   const { width, height } = cameras[0];
   scene.clearColor = Color4.FromHexString(`${background}ff`);
+  scene.render(); // asks for what is only then compiled
   await scene.whenReadyAsync();
   const camera = scene.activeCamera;
   const pictures = cameras.map((given) => {
