@@ -73,6 +73,10 @@ RADIUS_QUANTILE = 0.9
 """`textures.pixels_per_texel` holds on a sphere of this quantile of the radii of what is opaque: nearly the farthest,
 where texels are largest."""
 
+ENOUGH_CAMERAS = 16
+"""For texels that are alike on the surface. They are finer in the face than by angle, and fewer cameras leave them to
+fit what each of them sees alone: the actor gains 0.4 dB inside from 22, and loses 0.9 from 8 (docs/research/geometry)."""
+
 
 @dataclass(frozen=True)
 class Fit:
@@ -140,7 +144,8 @@ def fit_scene(scene: Scene, subject: FoundSubject, params: ExplicitParams, other
     there = by_angle.opacity >= start.subject_opacity
     radius = float(np.quantile(by_angle.middle[there], RADIUS_QUANTILE))
     texels = texel_count(scene, window, radius, params.textures.pixels_per_texel)
-    chart = with_even_texels(chart, window, by_angle.middle, there)
+    if len(cameras) >= ENOUGH_CAMERAS:
+        chart = with_even_texels(chart, window, by_angle.middle, there)
     uv = window_uv(window, rows, columns)
     first = surface_map(volume, chart, uv, cameras, surface, start)
     seen, middle = first.seen, first.middle
