@@ -75,7 +75,7 @@ where texels are largest."""
 
 ENOUGH_CAMERAS = 16
 """For texels that are alike on the surface. They are finer in the face than by angle, and fewer cameras leave them to
-fit what each of them sees alone: the actor gains 0.4 dB inside from 22, and loses 0.9 from 8 (docs/research/geometry)."""
+fit what each of them sees alone: inside, the actor gains 0.4 dB with 22 of them, and loses 0.9 with 8."""
 
 
 @dataclass(frozen=True)
