@@ -12,6 +12,8 @@ along d without being off.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_matrix, diags
@@ -118,12 +120,19 @@ def _linear(shares: Array, slides: Array, below: NDArray[np.bool_], around: Arra
 
 
 def radial_cosines(sheets: Sheets, layer: int) -> Array:
-    """(n, n) cosines between a layer's normals and its rays."""
-    uv = vertex_uv(sheets).reshape(sheets.st.shape)
-    points = sheets.chart.points(uv, sheets.radii[layer].astype(np.float64))
-    normals = np.cross(np.gradient(points, axis=0), np.gradient(points, axis=1))
-    along = np.abs((normals * sheets.chart.directions(uv)).sum(-1))
-    return np.asarray(along / np.maximum(np.linalg.norm(normals, axis=-1), 1e-12))
+    """(n, n) cosines between a layer's normals and its rays: 1 / sqrt(1 + |grad ln rho|^2) on the sphere.
+
+    Below a belt a step in u is as long everywhere, and the rays' own slant is left out.
+    """
+    uv = vertex_uv(sheets).reshape(sheets.st.shape) * (math.pi / 2)
+    radii, belt = sheets.radii[layer].astype(np.float64), sheets.chart.belt
+    logarithm = np.log(radii)
+    down = np.gradient(logarithm, uv[:, 0, 0], axis=0)
+    lowest = -math.pi / 2 if belt is None else -belt.elevation
+    right = np.gradient(logarithm, uv[0, :, 1], axis=1) / np.maximum(np.cos(np.maximum(uv[..., 0], lowest)), 1e-6)
+    if belt is not None:
+        down = np.where(uv[..., 0] < lowest, down * radii / belt.girth, down)
+    return np.asarray(1 / np.sqrt(1 + down**2 + right**2))
 
 
 @inlined

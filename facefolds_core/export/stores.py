@@ -26,7 +26,6 @@ from facefolds_core.geometry.meshes import Surface, TexturedMesh
 from facefolds_core.geometry.reflections import ReflectionMaps
 from facefolds_core.geometry.sphere_uv import Window
 from facefolds_core.geometry.torso import NUMBERS, Torso
-from facefolds_core.geometry.warp import Warp
 
 
 @dataclass(frozen=True)
@@ -122,13 +121,7 @@ SHEETS: Kinds = {
     "falling": (np.bool_, ("m", "m")),
     "window": (np.float64, (4,)),
 }
-CHART: Kinds = {
-    "centre": (np.float64, (3,)),
-    "belt": (np.float64, (2,)),
-    "warp": (np.float64, (2, "rows", "columns", 2)),
-    "warp_window": (np.float64, (4,)),
-}
-"""The last three where there is one."""
+CHART: Kinds = {"centre": (np.float64, (3,)), "belt": (np.float64, (2,))}
 TORSO: Kinds = {"torso": (np.float64, (NUMBERS,))}
 SURFACE: Kinds = {"vertices": (np.float32, ("V", 3)), "faces": (np.int32, ("F", 3))}
 TEXTURED: Kinds = {**SURFACE, "st": (np.float32, ("V", 2))}
@@ -184,27 +177,19 @@ def _chart_arrays(chart: Chart) -> Arrays:
     arrays = {"centre": np.array(chart.centre, np.float64)}
     if chart.belt is not None:
         arrays["belt"] = np.array([chart.belt.elevation, chart.belt.girth], np.float64)
-    if chart.warp is not None:
-        arrays["warp"] = np.stack([chart.warp.forth, chart.warp.back])
-        arrays["warp_window"] = np.array(chart.warp.window)
     return arrays
 
 
 def _take_chart(arrays: Arrays, path: Path) -> Chart:
+    """Of files from before there were belts, too."""
     taken = _take(arrays, path, {name: kind for name, kind in CHART.items() if name == "centre" or name in arrays})
     x, y, z = taken["centre"].tolist()
-    belt = Belt(*taken["belt"].tolist()) if "belt" in taken else None
-    if belt is not None and not belt.sound:
+    if "belt" not in taken:
+        return Chart((x, y, z))
+    belt = Belt(*taken["belt"].tolist())
+    if not belt.sound:
         raise _damaged(path, "belt", f"one {Belt.BOUNDS}", taken["belt"].tolist())
-    return Chart((x, y, z), belt, _take_warp(taken, path) if "warp" in taken else None)
-
-
-def _take_warp(arrays: Arrays, path: Path) -> Warp:
-    u0, u1, v0, v1 = _take(arrays, path, {"warp_window": CHART["warp_window"]})["warp_window"].tolist()
-    warp = Warp((u0, u1, v0, v1), *arrays["warp"])
-    if not (u0 < u1 and v0 < v1 and warp.sound):
-        raise _damaged(path, "warp", "one within its window", f"another, window {warp.window}")
-    return warp
+    return Chart((x, y, z), belt)
 
 
 def _check_windows(windows: NDArray[np.float64], path: Path) -> None:

@@ -8,9 +8,6 @@ the cone between them, where the map is continuous. With p - c = (x, y, z), h = 
 u = -2/pi (e + (-z - h tan e) / girth), v = 2/pi atan2(y, x), radius = h / cos e.
 
 v is the azimuth / 90 degrees and may go beyond [-1, 1] (behind the ears), up to +-2.
-
-A chart may be warped: these are then the *angles*, and (u, v) is where a warp takes them, so that a texture can have
-its texels where the surface is.
 """
 
 from __future__ import annotations
@@ -24,7 +21,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facefolds_core.geometry.sphere_uv import library_of, points_to_uv, uv_to_directions
-from facefolds_core.geometry.warp import Warp
 
 _TO_ANGLE = math.pi / 2
 
@@ -60,26 +56,16 @@ class Chart:
     Attributes:
         centre: c, units.
         belt: None for the paper's map, the sphere alone.
-        warp: from angles to (u, v); None where they are the same.
     """
 
     centre: tuple[float, float, float]
     belt: Belt | None = None
-    warp: Warp | None = None
 
     def __str__(self) -> str:
         return f"{self.centre[0]:.2f}" + ("" if self.belt is None else f" belt {self.belt.degrees:g}")
 
     def uv(self, points: Any) -> tuple[Any, Any]:
         """Points (..., 3), of numpy or torch -> (u, v) (..., 2) and radius (...)."""
-        angles, radius = self._angles_of(points)
-        return angles if self.warp is None else self.warp.apply(angles), radius
-
-    def angles(self, uv: Any) -> Any:
-        """(u, v) (..., 2) -> those of the chart without its warp (..., 2)."""
-        return uv if self.warp is None else self.warp.undo(uv)
-
-    def _angles_of(self, points: Any) -> tuple[Any, Any]:
         lib = library_of(points)
         centre = np.array(self.centre) if lib is np else points.new_tensor(self.centre)
         uv, radius = points_to_uv(points, centre)
@@ -96,17 +82,16 @@ class Chart:
 
     def directions(self, uv: Any) -> Any:
         """(u, v) (..., 2) -> unit directions (..., 3) of the rays, outwards."""
-        angles = self.angles(uv)
         if self.belt is None:
-            return uv_to_directions(angles)
-        lib = library_of(angles)
-        return uv_to_directions(lib.stack([lib.clip(angles[..., 0], self.lowest, None), angles[..., 1]], -1))
+            return uv_to_directions(uv)
+        lib = library_of(uv)
+        return uv_to_directions(lib.stack([lib.clip(uv[..., 0], self.lowest, None), uv[..., 1]], -1))
 
     def origins(self, uv: Any) -> Any:
         """(u, v) (..., 2) -> where the rays begin (..., 3): c, or below it."""
         zero = uv[..., 0] * 0
         x, y, z = self.centre
-        down = zero if self.belt is None else self._fall(self.angles(uv), self.belt) * self.belt.girth
+        down = zero if self.belt is None else self._fall(uv, self.belt) * self.belt.girth
         return library_of(uv).stack([zero + x, zero + y, z - down], -1)
 
     def points(self, uv: Any, radius: Any) -> Any:
@@ -120,15 +105,15 @@ class Chart:
         if self.belt is None:
             return directions
         x, y, z = (directions[..., k] for k in range(3))
-        return library_of(uv).stack([x, y, z - self._fall(self.angles(uv), self.belt)], -1)
+        return library_of(uv).stack([x, y, z - self._fall(uv, self.belt)], -1)
 
     def below(self, uv: Any) -> Any:
         """(u, v) (..., 2) -> (...) bool: below the belt."""
-        return self.angles(uv)[..., 0] < self.lowest
+        return uv[..., 0] < self.lowest
 
     @property
     def lowest(self) -> float:
-        """Angle u of the belt, -inf without one."""
+        """u of the belt, -inf without one."""
         return -math.inf if self.belt is None else -self.belt.elevation / _TO_ANGLE
 
     def outward(self, points: Any) -> Any:
@@ -143,16 +128,7 @@ class Chart:
         e = self.belt.elevation
         return np.array([e, math.tan(e), 1 / math.cos(e), 1 / self.belt.girth])
 
-    @cached_property
-    def warped(self) -> NDArray[np.float64]:
-        """(rows, columns, 2) shares of the window's height, from above, and of its width, from the left, to which the
-        warp takes the nodes of a grid over it, as kernels take them; (0, 0, 2) without one."""
-        if self.warp is None:
-            return np.zeros((0, 0, 2))
-        u0, u1, v0, v1 = self.warp.window
-        return np.asarray((self.warp.forth - np.array([u1, v0])) / np.array([u0 - u1, v1 - v0]))
-
     @staticmethod
-    def _fall(angles: Any, belt: Belt) -> Any:
-        """Angles (..., 2) -> (...) radians of u below the belt, 0 above it."""
-        return library_of(angles).clip(-angles[..., 0] * _TO_ANGLE - belt.elevation, 0, None)
+    def _fall(uv: Any, belt: Belt) -> Any:
+        """(u, v) (..., 2) -> (...) radians of u below the belt, 0 above it."""
+        return library_of(uv).clip(-uv[..., 0] * _TO_ANGLE - belt.elevation, 0, None)

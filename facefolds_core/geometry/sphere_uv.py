@@ -92,12 +92,6 @@ def texel_uv(height: int, width: int, window: Window = FULL_WINDOW) -> np.ndarra
     return np.asarray(st_to_uv(np.stack([s, t], -1), window))
 
 
-def window_uv(window: Window, rows: int, columns: int) -> NDArray[np.float64]:
-    """(rows, columns, 2) of the nodes of a grid over a window: they include its borders."""
-    u, v = np.linspace(window[1], window[0], rows), np.linspace(window[2], window[3], columns)
-    return np.stack(np.meshgrid(u, v, indexing="ij"), -1)
-
-
 def row_strides(resolution: int, window: Window, lowest: float = -math.inf) -> NDArray[np.intp]:
     """(R,) how many columns of each row span the same angle as one column does at the equator: 1 / cos(elevation).
 

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 import torch
@@ -13,9 +12,8 @@ from torch import Tensor, nn
 
 from facefolds_core.geometry.chart import Chart
 from facefolds_core.geometry.similarity import Similarity
-from facefolds_core.geometry.sphere_uv import Window, window_uv
+from facefolds_core.geometry.sphere_uv import Window
 from facefolds_core.geometry.torso import Torso
-from facefolds_core.geometry.warp import Warp
 from facefolds_core.model.intersection import Crossings, search_interval
 from facefolds_core.model.radial_kernel import bounds, crossing_distances, heights, placed_points
 
@@ -45,24 +43,14 @@ class RadialManifolds(nn.Module):
 
     centre: Tensor
     maps: Tensor
-    warp: Tensor | None
 
     def __init__(self, chart: Chart, window: Window, radii: Tensor, torso: Torso | None = None) -> None:
         super().__init__()
-        self._chart, self.torso = chart, torso
+        self.chart, self.torso = chart, torso
         self.register_buffer("centre", torch.tensor(chart.centre, dtype=torch.float32))
         self.register_buffer("maps", radii.clone())
         self.window = window
-        warp = None if chart.warp is None else np.stack([chart.warp.forth, chart.warp.back]).astype(np.float32)
-        self.register_buffer("warp", None if warp is None else torch.from_numpy(warp))
         self._prepared: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None  # radii, their `bounds`, `heights`
-
-    @property
-    def chart(self) -> Chart:
-        """With the warp as it is now: of a model that is read it comes after the rest."""
-        if self.warp is None:
-            return self._chart
-        return replace(self._chart, warp=Warp(self.window, *self.warp.cpu().double().numpy()))
 
     @property
     def num_layers(self) -> int:
@@ -133,26 +121,20 @@ class RadialManifolds(nn.Module):
         """A function, prepared for many calls, with the surfaces as they are now: (R, 3) float64 origins minus c,
         directions (R, 3) and a `bend` -> (R, N) float32 distances, 0 where missed."""
         rho = self.radii().cpu().numpy()
-        chart, window, bound = self.chart, np.array(self.window), self.radius
-        belt, warped = chart.numbers, chart.warped
+        window, belt, bound = np.array(self.window), self.chart.numbers, self.radius
         if self._prepared is None or not np.array_equal(self._prepared[0], rho, equal_nan=True):
-            self._prepared = rho, bounds(rho), heights(rho, self._angles(), belt)
+            self._prepared = rho, bounds(rho), heights(rho, window, belt)
         _, cells, high = self._prepared
         whole = int(np.isfinite(rho).all((0, 1)).sum())
 
         def distances(offsets: np.ndarray, directions: np.ndarray, bend: np.ndarray | None) -> np.ndarray:
             offsets, directions = np.ascontiguousarray(offsets), np.ascontiguousarray(directions)
             found: np.ndarray = crossing_distances(
-                offsets, directions, rho, window, belt, warped, cells, high, whole, bound, STEP, bend
+                offsets, directions, rho, window, belt, cells, high, whole, bound, STEP, bend
             )
             return found
 
         return distances
-
-    def _angles(self) -> np.ndarray:
-        """(rows, columns, 2) of the nodes; v is continuous across a border."""
-        rows, columns, warp = *self.maps.shape[:2], self.chart.warp
-        return window_uv(self.window, rows, columns) if warp is None else warp.before(rows, columns)
 
     def radii_at(self, uv: Tensor) -> tuple[Tensor, Tensor]:
         """Directions (u, v) [M, 2] -> rho [M, N], and whether they lie inside the window [M, N]."""

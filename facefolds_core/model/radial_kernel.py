@@ -12,7 +12,6 @@ from numba import prange
 from numpy.typing import NDArray
 
 from facefolds_core.geometry.chart_kernel import chart_position, chart_radius
-from facefolds_core.geometry.sphere_uv import ALL_AROUND
 from facefolds_core.kernels.hit_codes import SCALE
 from facefolds_core.kernels.jit import compiled, inlined, kernel
 
@@ -22,8 +21,16 @@ _TO_UV = 2.0 / math.pi
 
 
 @inlined
+def _grid_position(u, v, window, rows, columns):  # type: ignore[no-untyped-def]
+    """Row and column (continuous, node 0 at the window's top left corner) of (u, v)."""
+    row = (window[1] - u) / (window[1] - window[0]) * (rows - 1)
+    column = (v - window[2]) / (window[3] - window[2]) * (columns - 1)
+    return row, column
+
+
+@inlined
 def _look_up(rho, row, column, layer):  # type: ignore[no-untyped-def]
-    """Bilinear value of one layer; the position lies inside the grid."""
+    """Bilinear radius of one layer; the position lies inside the grid."""
     i = min(int(row), rho.shape[0] - 2)
     j = min(int(column), rho.shape[1] - 2)
     a = row - i
@@ -31,19 +38,6 @@ def _look_up(rho, row, column, layer):  # type: ignore[no-untyped-def]
     top = rho[i, j, layer] * (1 - b) + rho[i, j + 1, layer] * b
     bottom = rho[i + 1, j, layer] * (1 - b) + rho[i + 1, j + 1, layer] * b
     return top * (1 - a) + bottom * a
-
-
-@compiled
-def _grid_position(u: Any, v: Any, window: Any, warped: Any, rows: Any, columns: Any) -> Any:
-    """Row and column (continuous, node 0 at the window's top left corner) of a chart's angles."""
-    row = (window[1] - u) / (window[1] - window[0])
-    column = (v - window[2]) / (window[3] - window[2])
-    if warped.shape[0] > 0 and 0.0 <= row <= 1.0 and 0.0 <= column <= 1.0:
-        y, x = row * (warped.shape[0] - 1), column * (warped.shape[1] - 1)
-        row, column = _look_up(warped, y, x, 0), _look_up(warped, y, x, 1)
-        if window[3] - window[2] >= ALL_AROUND:
-            column -= math.floor(column)
-    return row * (rows - 1), column * (columns - 1)
 
 
 TRIES, EXACT = 8, 1e-6
@@ -133,42 +127,37 @@ def bounds(rho: Array) -> Array:
     return np.stack([np.maximum.reduce([high[c] for c in corners]), np.minimum.reduce([low[c] for c in corners])], -1)
 
 
-def heights(rho: Array, angles: Array, belt: Array) -> Array:
+def heights(rho: Array, window: Array, belt: Array) -> Array:
     """(2, CELLS, CELLS) float32: radii from which on no stride of SKIP, in any direction, meets a layer.
 
-    Cell (i, j) covers angles, u from the top and v from the left. First those of all layers, then of layers that have
-    holes.
+    Cell (i, j) covers u from the top and v from the left. First those of all layers, then of layers that have holes.
 
     Args:
-        rho, belt: as in `crossing_distances`.
-        angles: (rows, columns, 2) of the nodes; v is continuous across a border.
+        rho, window, belt: as in `crossing_distances`.
     """
     found = np.zeros((2, CELLS, CELLS), np.float32)
     reach = SKIP * belt[2]
     sliding = reach * belt[3] if math.isfinite(belt[1]) else 0.0
     for own, some in zip(found, (rho, rho[..., np.isnan(rho).any((0, 1))]), strict=True):
         if some.shape[-1]:
-            _heights(_coarse(bounds(some), angles), reach, sliding, own)
+            _heights(_coarse(bounds(some), window), reach, sliding, own)
     return found
 
 
 @compiled
-def _coarse(cells: Any, angles: Any) -> Any:
+def _coarse(cells: Any, window: Any) -> Any:
     """The largest radius of any grid cell, of `bounds`, that touches a cell of `heights`; 0 where there is none."""
+    rows, columns = cells.shape[0], cells.shape[1]
     found = np.zeros((CELLS, CELLS), np.float32)
-    for i in range(cells.shape[0]):
-        for j in range(cells.shape[1]):
-            own = angles[i : i + 2, j : j + 2]
-            for ci in range(_cell(2.0 - own[..., 0].max()), _cell(2.0 - own[..., 0].min()) + 1):
-                for cj in range(_unbound(own[..., 1].min() + 2.0), _unbound(own[..., 1].max() + 2.0) + 1):
-                    found[ci, cj % CELLS] = max(found[ci, cj % CELLS], cells[i, j, 0])
+    down, across = (window[1] - window[0]) / rows, (window[3] - window[2]) / columns
+    for i in range(rows):
+        top, bottom = window[1] - i * down, window[1] - (i + 1) * down
+        for j in range(columns):
+            left = window[2] + j * across
+            for ci in range(_cell(2.0 - top), _cell(2.0 - bottom) + 1):
+                for cj in range(_cell(left + 2.0), _cell(left + across + 2.0) + 1):
+                    found[ci, cj] = max(found[ci, cj], cells[i, j, 0])
     return found
-
-
-@inlined
-def _unbound(place):  # type: ignore[no-untyped-def]
-    """`_cell`, which goes on beyond the edge."""
-    return math.floor(place * 0.25 * CELLS)
 
 
 @inlined
@@ -218,7 +207,6 @@ def crossing_distances(
     rho: Array,  # (rows, columns, N) radii, outermost first, NaN where a layer has none, float32
     window: Array,  # (4,) u0, u1, v0, v1
     belt: Array,  # (4,) of `Chart.numbers`
-    warped: Array,  # of `Chart.warped`
     cells: Array,  # of `bounds`
     heights: Array,  # of `heights`
     whole: int,  # layers that have no holes; they come first
@@ -236,7 +224,7 @@ def crossing_distances(
     """
     result = np.zeros((offsets.shape[0], rho.shape[2]), np.float32)
     for ray in prange(offsets.shape[0]):
-        cross(ray, offsets, directions, rho, window, belt, warped, cells, heights, whole, bound, step, bend, result)
+        cross(ray, offsets, directions, rho, window, belt, cells, heights, whole, bound, step, bend, result)
     return result
 
 
@@ -248,7 +236,6 @@ def cross(
     rho: Any,
     window: Any,
     belt: Any,
-    warped: Any,
     cells: Any,
     heights: Any,
     whole: Any,
@@ -294,7 +281,7 @@ def cross(
                 break
             s = min(s + stride(x, y, z, step, bend), far)
             continue
-        row, column = _grid_position(u, v, window, warped, rows, columns)
+        row, column = _grid_position(u, v, window, rows, columns)
         if row < 0.0 or column < 0.0 or row > rows - 1 or column > columns - 1:
             last = -1.0
         else:
@@ -306,7 +293,7 @@ def cross(
                 t = 0.5 * (last + s)
                 mx, my, mz = placed(ox + t * dx, oy + t * dy, oz + t * dz, bend)
                 mid_u, mid_v, _ = chart_position(mx, my, mz, belt)
-                mid_row, mid_column = _grid_position(mid_u, mid_v, window, warped, rows, columns)
+                mid_row, mid_column = _grid_position(mid_u, mid_v, window, rows, columns)
                 bend_row = 2.0 * (row_before + row) - 4.0 * mid_row
                 bend_column = 2.0 * (column_before + column) - 4.0 * mid_column
                 for n in range(layers):
@@ -323,13 +310,9 @@ def cross(
                             f = fa + (fb - fa) * (ga / (ga - gb))
                             d = last + f * (s - last)
                             x, y, z = placed(ox + d * dx, oy + d * dy, oz + d * dz, bend)
-                            if warped.shape[0] > 0:  # bent more than a parabola is
-                                u, v, at_radius = chart_position(x, y, z, belt)
-                                at_row, at_column = _grid_position(u, v, window, warped, rows, columns)
-                            else:
-                                at_row = row_before + f * (row - row_before + bend_row * (f - 1.0))
-                                at_column = column_before + f * (column - column_before + bend_column * (f - 1.0))
-                                at_radius = chart_radius(x, y, z, belt)
+                            at_row = row_before + f * (row - row_before + bend_row * (f - 1.0))
+                            at_column = column_before + f * (column - column_before + bend_column * (f - 1.0))
+                            at_radius = chart_radius(x, y, z, belt)
                             gm = at_radius - _look_up(rho, at_row, at_column, n)
                             if abs(gm) < 1e-6 or math.isnan(gm):
                                 break
@@ -362,7 +345,6 @@ def texture_positions(
     distance: Array,  # (R, N) float32, 0 where missed
     window: Array,  # (4,)
     belt: Array,  # (4,)
-    warped: Array,
     bend: Array | None,  # of `crossing_distances`
 ) -> Array:
     """(R, N, 2) uint16: s and t of the crossings over the window, as `hit_codes` has them."""
@@ -379,7 +361,7 @@ def texture_positions(
                 bend,
             )
             u, v, _ = chart_position(x, y, z, belt)
-            row, column = _grid_position(u, v, window, warped, 2, 2)
+            row, column = _grid_position(u, v, window, 2, 2)
             codes[ray, n, 0] = int(1.5 + SCALE * min(max(column, 0.0), 1.0))
             codes[ray, n, 1] = int(1.5 + SCALE * min(max(row, 0.0), 1.0))
     return codes

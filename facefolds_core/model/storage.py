@@ -7,7 +7,6 @@ from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, Literal, Union
 
-import numpy as np
 import torch
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, TypeAdapter, ValidationError, model_validator
 
@@ -16,7 +15,6 @@ from facefolds_core.files.reading import check_regular
 from facefolds_core.files.writing import read_json, write_json
 from facefolds_core.geometry.chart import Belt, Chart
 from facefolds_core.geometry.torso import Torso
-from facefolds_core.geometry.warp import Warp
 from facefolds_core.model.grids import GridTextures
 from facefolds_core.model.manifolds import MlpManifolds
 from facefolds_core.model.radial import RadialManifolds
@@ -94,7 +92,6 @@ class ExplicitSpec(BaseModel):
         nodes: rows and columns of the radius maps.
         texels: H and W of the textures.
         num_layers, num_frames: N and K.
-        warp: rows and columns of the chart's; absent where there is none.
         reflection: rows and columns of its maps, texels a side of its environment; absent where there is none.
         segments: frames in each file of `segmented.py`; absent where all frames are in model.safetensors.
         fingerprint: of the configuration and scene that it was trained with (training/checkpoints.py).
@@ -113,7 +110,6 @@ class ExplicitSpec(BaseModel):
     texels: tuple[Count, Count]
     num_layers: Annotated[int, Field(ge=1)]
     num_frames: Annotated[int, Field(ge=1)]
-    warp: Annotated[tuple[Count, Count] | None, Field(exclude_if=lambda shape: shape is None)] = None
     reflection: Annotated[tuple[Count, Count, Count] | None, Field(exclude_if=lambda shape: shape is None)] = None
     segments: Annotated[
         tuple[Annotated[int, Field(ge=1)], ...] | None, Field(min_length=1, exclude_if=lambda shape: shape is None)
@@ -151,8 +147,7 @@ def build_explicit(spec: ExplicitSpec) -> RadianceManifolds:
     else:
         textures = SegmentedTextures(spec.window, spec.texels, spec.num_layers, spec.segments, reflection)
     blank = torch.ones(*spec.nodes, spec.num_layers)
-    warp = None if spec.warp is None else Warp(spec.window, *np.zeros((2, *spec.warp, 2)))
-    manifolds = RadialManifolds(Chart(spec.centre, spec.belt, warp), spec.window, blank, spec.torso)
+    manifolds = RadialManifolds(Chart(spec.centre, spec.belt), spec.window, blank, spec.torso)
     return RadianceManifolds(manifolds, textures)
 
 
@@ -246,8 +241,6 @@ def load_model(folder: str | Path, device: torch.device | str = "cpu") -> Radian
         model = build_model(spec)
     check_tensors(tensors, model.state_dict(), path, _REMEDY)
     model.load_state_dict(tensors)
-    if model.chart.warp is not None and not model.chart.warp.sound:
-        raise UserError("the chart's warp is damaged", file=path, expected="one within the window", remedy=_REMEDY)
     if isinstance(model.textures, SegmentedTextures):
         model.textures.attach([segment_file(folder, i) for i in range(len(model.textures.lengths))], _REMEDY)
     return model.to(device).eval()

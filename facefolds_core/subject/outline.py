@@ -12,7 +12,7 @@ from scipy import ndimage
 
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.chart import Belt, Chart
-from facefolds_core.geometry.sphere_uv import Window, window_uv
+from facefolds_core.geometry.sphere_uv import Window
 from facefolds_core.params import StartParams
 from facefolds_core.subject import look_kernel
 from facefolds_core.subject.found import no_subject
@@ -114,6 +114,12 @@ def nodes_at(uv: Array, window: Window, shape: tuple[int, ...]) -> tuple[NDArray
     within = (i >= 0) & (i <= last[0]) & (j >= 0) & (j <= last[1])
     row, column = (np.rint(at).astype(np.intp).clip(0, most) for at, most in zip((i, j), last, strict=True))
     return row, column, np.asarray(within)
+
+
+def window_uv(window: Window, rows: int, columns: int) -> Array:
+    """(rows, columns, 2) of the nodes of a radius map: they include the window's borders."""
+    u, v = np.linspace(window[1], window[0], rows), np.linspace(window[2], window[3], columns)
+    return np.stack(np.meshgrid(u, v, indexing="ij"), -1)
 
 
 def texel_middles(window: Window, rows: int, columns: int) -> Array:

@@ -172,9 +172,7 @@ def test_cosines_of_a_cone_are_those_of_its_normals() -> None:
     cone = Sheets(
         st, (0.2 - 0.1 * u)[None], everywhere, 255 * everywhere, everywhere[0, 1:, 1:], np.array(window), chart
     )
-    np.testing.assert_allclose(
-        radial_cosines(cone, 0), 1 / np.hypot(1, 1 / 3), atol=2e-3
-    )  # differences one-sided at borders
+    np.testing.assert_allclose(radial_cosines(cone, 0), 1 / np.hypot(1, 1 / 3), atol=1e-3)
 
 
 def test_poisson_surfaces_are_decimated_upright(grids: Grids) -> None:

@@ -26,10 +26,8 @@ from facefolds_core.export.stores import (
 from facefolds_core.geometry.chart import Belt, Chart
 from facefolds_core.geometry.meshes import Surface, TexturedMesh
 from facefolds_core.geometry.torso import Torso
-from facefolds_core.geometry.warp import Warp
 from tests.assets import TORSO
 from tests.ellipsoids import Ellipsoids
-from tests.warps import ring_warp
 
 TRIANGLE = TexturedMesh(
     np.eye(3, dtype=np.float32), np.array([[0, 1, 2]], np.int32), np.array([[0, 0], [0.5, 1], [1, 0]], np.float32)
@@ -55,15 +53,6 @@ def test_grids_round_trip(tmp_path: Path, grids: Grids, belt: Belt | None, torso
         assert np.array_equal(getattr(back, name), getattr(grids, name))
     places = read_places(path)
     assert places[1] == back.chart == chart and places[3] == back.torso == torso
-
-
-@pytest.mark.parametrize("belt", [None, Belt(0.2, 0.3)])
-def test_a_chart_keeps_its_warp(tmp_path: Path, grids: Grids, belt: Belt | None) -> None:
-    warp, path = ring_warp((-0.5, 0.5, -0.6, 0.6)), tmp_path / "grids.npz"
-    write_grids(path, replace(grids, chart=Chart((0.1, 0.2, 0.3), belt, warp)))
-    back = read_grids(path).chart
-    assert back.warp is not None and back.belt == belt and back.warp.window == warp.window
-    assert np.array_equal([back.warp.forth, back.warp.back], [warp.forth, warp.back])
 
 
 def test_meshes_and_surfaces_round_trip_and_are_the_same_bytes_each_time(tmp_path: Path) -> None:
@@ -109,18 +98,12 @@ def test_what_is_missing_a_lone_array_or_pickled_is_refused(tmp_path: Path) -> N
         read_meshes(tmp_path / "meshes.npz")
 
 
-OUTSIDE = Warp((-0.5, 0.5, -0.5, 0.5), *np.full((2, 3, 3, 2), 0.7))
 WRONG: list[tuple[str, dict[str, Any], str]] = [
     ("grids", {"points": np.zeros((2, 8, 8, 2), np.float32)}, "points"),
     ("grids", {"normals": np.full((2, 8, 8, 3), np.nan, np.float32)}, "normals"),
     ("grids", {"valid": np.ones((2, 8, 8), np.uint8)}, "valid"),
     ("grids", {"opacity": np.ones((2, 8, 8), bool)}, "opacity"),
     ("grids", {"chart": Chart((0.0, np.nan, 0.0))}, "centre"),
-    (
-        "grids",
-        {"chart": Chart((0.0, 0.0, 0.0), None, Warp((-0.5, 0.5, -0.5, 0.5), *np.full((2, 3, 3, 2), 0.7)))},
-        "warp",
-    ),
     ("grids", {"torso": replace(TORSO, normal=(0.0, 0.0, 2.0))}, "torso"),
     ("grids", {"windows": np.tile([0.5, -0.5, -1.0, 1.0], (2, 1))}, "windows"),
     ("sheets", {"radii": np.ones((2, 8, 7), np.float32)}, "radii"),

@@ -10,8 +10,7 @@ from scipy import ndimage
 from scipy.spatial import cKDTree
 
 from facefolds_core.geometry.chart import Belt, Chart
-from facefolds_core.geometry.sphere_uv import window_uv
-from facefolds_core.subject.outline import MIN_RADIUS
+from facefolds_core.subject.outline import MIN_RADIUS, window_uv
 from facefolds_core.training.explicit.offsets import Offsets, offsets, over_frames
 from tests.assets import grid_faces
 

@@ -8,8 +8,7 @@ from numpy.typing import NDArray
 
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.chart import Chart
-from facefolds_core.geometry.sphere_uv import window_uv
-from facefolds_core.subject.outline import profile
+from facefolds_core.subject.outline import profile, window_uv
 from facefolds_core.subject.volume import Volume
 from facefolds_core.training.explicit.second_surface import (
     GAP,

@@ -16,7 +16,7 @@ from facefolds_core.errors import UserError
 from facefolds_core.facts import Fact, fact
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.chart import Chart
-from facefolds_core.geometry.sphere_uv import Window, closed, window_uv
+from facefolds_core.geometry.sphere_uv import Window, closed
 from facefolds_core.geometry.torso import Torso
 from facefolds_core.params import ExplicitParams, GeometryParams, StartParams
 from facefolds_core.rendering.compositing import transmittance_before
@@ -29,6 +29,7 @@ from facefolds_core.subject.outline import (
     profile,
     visible_points,
     whole_window,
+    window_uv,
 )
 from facefolds_core.subject.sight import seen_by
 from facefolds_core.subject.splats import Splats
@@ -36,7 +37,6 @@ from facefolds_core.subject.storage import FoundSubject
 from facefolds_core.subject.volume import CELLS, COARSE, Volume, volume_of
 from facefolds_core.training.explicit.offsets import Offsets, offsets, over_frames
 from facefolds_core.training.explicit.second_surface import LAYERS, large, second_surface
-from facefolds_core.training.explicit.texel_density import with_even_texels
 from facefolds_core.training.explicit.tracked import (
     FAR,
     OPACITY,
@@ -72,10 +72,6 @@ not show where the surface lies within less. `geometry.halfwidth` is always allo
 RADIUS_QUANTILE = 0.9
 """`textures.pixels_per_texel` holds on a sphere of this quantile of the radii of what is opaque: nearly the farthest,
 where texels are largest."""
-
-ENOUGH_CAMERAS = 16
-"""For texels that are alike on the surface. They are finer in the face than by angle, and fewer cameras leave them to
-fit what each of them sees alone: inside, the actor gains 0.4 dB with 22 of them, and loses 0.9 with 8."""
 
 
 @dataclass(frozen=True)
@@ -116,11 +112,6 @@ class Fit:
     start_psnr: float
     torso: Torso | None = None
 
-    @property
-    def lost(self) -> float:
-        """Share of the visible surface that the chart loses."""
-        return self.losses[replace(self.chart, warp=None)]
-
 
 def fit_scene(scene: Scene, subject: FoundSubject, params: ExplicitParams, others: Sequence[Splats] = ()) -> Fit:
     """Centre, window, radii, spacing and texels from the volume, and from the tracked mesh where there is one.
@@ -140,15 +131,21 @@ def fit_scene(scene: Scene, subject: FoundSubject, params: ExplicitParams, other
     vertices = None if surface is None else surface[0].astype(np.float64)
     window = fit_window(coarse, chart, visible, vertices, start, around)
     rows, columns = grid_shape(window, geometry.nodes, LEAST_NODES)
-    by_angle = surface_map(volume, chart, window_uv(window, -(-rows // 2), -(-columns // 2)), cameras, surface, start)
-    there = by_angle.opacity >= start.subject_opacity
-    radius = float(np.quantile(by_angle.middle[there], RADIUS_QUANTILE))
-    texels = texel_count(scene, window, radius, params.textures.pixels_per_texel)
-    if len(cameras) >= ENOUGH_CAMERAS:
-        chart = with_even_texels(chart, window, by_angle.middle, there)
     uv = window_uv(window, rows, columns)
-    first = surface_map(volume, chart, uv, cameras, surface, start)
-    seen, middle = first.seen, first.middle
+    seen = profile(volume, chart, uv, start.subject_opacity)
+    opacity = seen.opacity.astype(np.float64)
+    if surface is None or vertices is None:
+        known, kept = seen.radius, np.zeros((rows, columns))
+        source = fact("middle_from_volume")
+    else:
+        mesh = mesh_radii(vertices, surface[1], chart, uv)
+        share = seen_by(cameras, chart.points(uv, mesh).reshape(-1, 3)).reshape(mesh.shape) / len(cameras)
+        unseen = (share < MIN_VIEW_SHARE) & np.isfinite(mesh)
+        seen = replace(seen, radius=np.where(unseen, np.nan, seen.radius))
+        known, kept = blend(mesh, seen.radius, np.where(share < WELL_SEEN, FAR, REACH))
+        opacity = np.where(np.isfinite(mesh) & np.isnan(seen.radius), np.maximum(opacity, OPACITY), opacity)
+        source = fact("middle_from_mesh", reach=REACH)
+    middle = extrapolate(known).clip(MIN_RADIUS)
     least, most = halfwidths(geometry, pixel_size(scene))
     frames = [seen.radius]
     for splats in others:
@@ -159,6 +156,8 @@ def fit_scene(scene: Scene, subject: FoundSubject, params: ExplicitParams, other
     widths = spread(seen, own, least, most, volume.voxel)
     mean, reach = over_frames(own, list(zip(frames, theirs, strict=True)), widths)
     mean = mean.through(middle, own.radius(np.zeros_like(middle)), 2 * volume.voxel)
+    radius = float(np.quantile(middle[opacity >= start.subject_opacity], RADIUS_QUANTILE))
+    texels = texel_count(scene, window, radius, params.textures.pixels_per_texel)
     second = second_surface(volume, chart, window, mean.radius(-widths - reach), cameras)
     return Fit(
         chart=chart,
@@ -167,58 +166,16 @@ def fit_scene(scene: Scene, subject: FoundSubject, params: ExplicitParams, other
         halfwidth=widths,
         reach=reach,
         second=second,
-        trust=TRUST * first.kept + reach,
+        trust=TRUST * kept + reach,
         rgb=seen.rgb.astype(np.float64),
         texels=texels,
-        reasons=(*_reasons(params, losses[replace(chart, warp=None)], first.source, (least, most), second), *notes),
+        reasons=(*_reasons(params, losses[chart], source, (least, most), second), *notes),
         notes=notes,
         volume=volume,
         losses=losses,
         start_psnr=subject.psnr,
         torso=subject.torso,
     )
-
-
-@dataclass(frozen=True)
-class SurfaceMap:
-    """What layers are to lie about, at nodes (rows, columns) of a chart.
-
-    Attributes:
-        seen: of the volume; no radius where hardly a camera looks and a tracked mesh says where the surface is.
-        middle: radii, units, everywhere.
-        kept: share of the tracked mesh in them.
-        opacity: of the subject.
-        source: where the radii come from.
-    """
-
-    seen: Profile
-    middle: Array
-    kept: Array
-    opacity: Array
-    source: Fact
-
-
-def surface_map(
-    volume: Volume,
-    chart: Chart,
-    uv: Array,
-    cameras: Sequence[Camera],
-    mesh: tuple[NDArray[np.float32], NDArray[np.int32]] | None,
-    start: StartParams,
-) -> SurfaceMap:
-    """From the volume, and from a tracked mesh (vertices and faces) that is trusted, at (u, v) (rows, columns, 2)."""
-    seen = profile(volume, chart, uv, start.subject_opacity)
-    opacity = seen.opacity.astype(np.float64)
-    if mesh is None:
-        middle = extrapolate(seen.radius).clip(MIN_RADIUS)
-        return SurfaceMap(seen, middle, np.zeros(middle.shape), opacity, fact("middle_from_volume"))
-    tracked = mesh_radii(mesh[0].astype(np.float64), mesh[1], chart, uv)
-    share = seen_by(cameras, chart.points(uv, tracked).reshape(-1, 3)).reshape(tracked.shape) / len(cameras)
-    unseen = (share < MIN_VIEW_SHARE) & np.isfinite(tracked)
-    seen = replace(seen, radius=np.where(unseen, np.nan, seen.radius))
-    known, kept = blend(tracked, seen.radius, np.where(share < WELL_SEEN, FAR, REACH))
-    opacity = np.where(np.isfinite(tracked) & np.isnan(seen.radius), np.maximum(opacity, OPACITY), opacity)
-    return SurfaceMap(seen, extrapolate(known).clip(MIN_RADIUS), kept, opacity, fact("middle_from_mesh", reach=REACH))
 
 
 def volume_in(scene: Scene, splats: Splats, cells: int = CELLS) -> Volume:

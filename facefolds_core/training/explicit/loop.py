@@ -103,8 +103,9 @@ def warnings_of(scene: Scene, fit: Fit) -> tuple[Fact, ...]:
     found = []
     if fit.start_psnr < MIN_START_PSNR:
         found.append(fact("start_explains_little", psnr=fit.start_psnr, under=MIN_START_PSNR))
-    if fit.lost > MAX_LOST:
-        found.append(fact("surface_without_a_place", share=fit.lost, x=fit.chart.centre[0]))
+    lost = fit.losses[fit.chart]
+    if lost > MAX_LOST:
+        found.append(fact("surface_without_a_place", share=lost, x=fit.chart.centre[0]))
     if any(line.kind == "front_found" for line in scene.left_out):
         found.append(fact("front_is_guessed"))
     return tuple(found)

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from facefolds_core.geometry.chart import Chart
-from facefolds_core.geometry.sphere_uv import Window, window_uv
-from facefolds_core.subject.outline import MIN_RADIUS, node_positions
+from facefolds_core.geometry.sphere_uv import Window
+from facefolds_core.subject.outline import MIN_RADIUS, node_positions, window_uv
 from facefolds_core.training.explicit.second_surface import large
 
 Array = NDArray[np.float64]

@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from facefolds_core.geometry.chart import Chart
-from facefolds_core.geometry.sphere_uv import Window, texel_uv, window_uv
+from facefolds_core.geometry.sphere_uv import Window, texel_uv
 from facefolds_core.kernels.hit_codes import SCALE
 from facefolds_core.model.reflection import Reflection, ReflectionShape
 from facefolds_core.params import ReflectionParams
+from facefolds_core.subject.outline import window_uv
 from facefolds_core.training.explicit.reflection_kernel import reflect, sample
 from facefolds_core.training.explicit.views import Views
 

@@ -10,9 +10,8 @@ from scipy import ndimage
 from facefolds_core.captures.scene import Scene
 from facefolds_core.facts import Fact, fact
 from facefolds_core.geometry.chart import Chart
-from facefolds_core.geometry.sphere_uv import window_uv
 from facefolds_core.params import StartParams
-from facefolds_core.subject.outline import profile, whole_window
+from facefolds_core.subject.outline import profile, whole_window, window_uv
 from facefolds_core.subject.volume import Volume
 
 Array = NDArray[np.float64]

@@ -253,7 +253,6 @@ class Trainer:
             centre=self.fit.chart.centre,
             belt=self.fit.chart.belt,
             torso=self.fit.torso,
-            warp=None if self.fit.chart.warp is None else self.fit.chart.warp.forth.shape[:2],
             window=self.fit.window,
             nodes=(self.shift.shape[0], self.shift.shape[1]),
             texels=(h, w),

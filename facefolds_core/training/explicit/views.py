@@ -89,7 +89,7 @@ class Tracer:
         self.count = len(self._real) + (0 if virtual is None else len(virtual.cameras))
         self._centre = manifolds.centre.cpu().numpy().astype(np.float64)
         self._window, self._trace = np.array(manifolds.window), manifolds.tracer()
-        self._belt, self._warped, self._bend = manifolds.chart.numbers, manifolds.chart.warped, manifolds.bend
+        self._belt, self._bend = manifolds.chart.numbers, manifolds.bend
 
     def views(self, position: int, first: int, stride: int, frames: Sequence[int], fine: bool) -> Views:
         """Every `stride`-th pixel from number `first` on, if its rays meet a layer; of virtual cameras fewer.
@@ -130,8 +130,7 @@ class Tracer:
         offsets, directions = np.ascontiguousarray(origins - self._centre), np.ascontiguousarray(directions)
         bend = self._bend(pose)
         distance = self._trace(offsets, directions, bend)
-        codes = texture_positions(offsets, directions, distance, self._window, self._belt, self._warped, bend)
-        return codes, directions
+        return texture_positions(offsets, directions, distance, self._window, self._belt, bend), directions
 
     def _pose(self, position: int, frame: int) -> Similarity | None:
         """In which a camera sees the head turned over the torso; virtual ones see the layers as they were made."""
