@@ -30,11 +30,12 @@ export async function decodeMesh(buffer, layer, file) {
 }
 
 function areaOf(index, position) {
+  const edge = (from, to, k) => position[3 * to + k] - position[3 * from + k];
   let twice = 0;
   for (let i = 0; i < index.length; i += 3) {
-    const [a, b, c] = [0, 1, 2].map((k) => position.subarray(3 * index[i + k], 3 * index[i + k] + 3));
-    const [x, y, z] = b.map((v, k) => v - a[k]);
-    const [u, v, w] = c.map((v, k) => v - a[k]);
+    const [a, b, c] = [index[i], index[i + 1], index[i + 2]];
+    const [x, y, z] = [edge(a, b, 0), edge(a, b, 1), edge(a, b, 2)];
+    const [u, v, w] = [edge(a, c, 0), edge(a, c, 1), edge(a, c, 2)];
     twice += Math.hypot(y * w - z * v, z * u - x * w, x * v - y * u);
   }
   return twice / 2;
